@@ -1,0 +1,382 @@
+"""The nouns: the time axis, and the reward decomposition that lives on it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.errors import InputError
+from trdlab.formatting import decimals_for, number
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+SCHEMA = "trdlab.RewardDecomposition/1"
+
+
+@dataclass(frozen=True)
+class TimeAxis:
+    """Which future steps each component speaks of.
+
+    Component i < N covers the agent steps `t+i·w … t+(i+1)·w−1`; component N, the residual,
+    covers all later ones. Component 0 holds the reward of the action taken now (errata P1, P8).
+
+    Args:
+        gamma: the discount factor, in [0, 1).
+        horizon: N, the number of explicit components, at least 0.
+        width: w, the agent steps in each explicit component, at least 1.
+
+    Raises:
+        InputError: a value is out of its range.
+
+    Source: the paper's Eqs. trd-array and trd-binned-array.
+
+    >>> TimeAxis(gamma=0.95, horizon=2, width=2).labels
+    ('t…t+1', 't+2…t+3', 't+4…∞')
+    """
+
+    gamma: float
+    horizon: int
+    width: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.gamma < 1.0:
+            raise InputError(
+                f"The discount factor gamma is {self.gamma}.",
+                "It must be at least 0 and less than 1, for example 0.95.",
+            )
+        for name, value, least in (("horizon N", self.horizon, 0), ("width w", self.width, 1)):
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+                raise InputError(
+                    f"The {name} is {value}.", f"It must be a whole number of at least {least}."
+                )
+
+    @property
+    def num_components(self) -> int:
+        """N+1: the explicit components and the residual."""
+        return self.horizon + 1
+
+    @property
+    def num_steps(self) -> int:
+        """N·w: the agent steps that the explicit components cover; the residual starts there."""
+        return self.horizon * self.width
+
+    def start(self, component: int) -> int:
+        """Returns the first agent step, counted from t, that a component covers."""
+        return self._checked(component) * self.width
+
+    def steps(self, component: int) -> range | None:
+        """Returns the agent steps that an explicit component covers, or None for the residual.
+
+        >>> TimeAxis(0.95, horizon=2, width=2).steps(1)
+        range(2, 4)
+        """
+        start = self.start(component)
+        return None if component == self.horizon else range(start, start + self.width)
+
+    def label(self, component: int) -> str:
+        """Returns the steps of a component as text: `t+1`, `t+2…t+3`, or `t+4…∞`."""
+        start, steps = self.start(component), self.steps(component)
+        if steps is None:
+            return f"{_step(start)}…∞"
+        return _step(start) if self.width == 1 else f"{_step(start)}…{_step(steps[-1])}"
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels of all N+1 components."""
+        return tuple(self.label(i) for i in range(self.num_components))
+
+    @property
+    def discounts(self) -> FloatArray:
+        """`[N+1]`: γ^(i·w), the discount of the first step of each component."""
+        steps = np.arange(self.num_components) * self.width
+        return np.power(float(self.gamma), steps)
+
+    def regrouped(self, width: int) -> "TimeAxis":
+        """Returns the axis of the same steps in wider groups.
+
+        Raises:
+            InputError: `width` is no multiple of the present width, or does not divide N·w.
+        """
+        if not isinstance(width, int) or width < 1 or width % self.width:
+            raise InputError(
+                f"Groups of {self.width} cannot be regrouped to a width of {width}.",
+                f"Choose a multiple of {self.width}.",
+            )
+        if self.num_steps % width:
+            widths = range(self.width, self.num_steps + 1, self.width)
+            fits = [w for w in widths if self.num_steps % w == 0]
+            raise InputError(
+                f"{self.num_steps} steps do not divide into groups of {width}: "
+                f"the last group would be short.",
+                f"Choose a width from {fits}, or a horizon that is a multiple of {width}.",
+            )
+        return TimeAxis(self.gamma, self.num_steps // width, width)
+
+    def _checked(self, component: int) -> int:
+        if not 0 <= component <= self.horizon:
+            raise InputError(
+                f"There is no component {component}.", f"Components run from 0 to {self.horizon}."
+            )
+        return component
+
+
+def _step(offset: int) -> str:
+    return "t" if offset == 0 else f"t+{offset}"
+
+
+@dataclass(frozen=True, eq=False)
+class RewardDecomposition:
+    """Expected discounted rewards, split over future time.
+
+    The last axis of `components` is the time axis: N explicit components and the residual. The
+    leading axes say what is decomposed: `[A, N+1]` a moment, `[B, A, N+1]` a batch,
+    `[T, A, N+1]` an episode, `[S, A, N+1]` a table; without A, state values.
+
+    Args:
+        components: `[..., N+1]`, in units of discounted reward; copied, and read-only after.
+        time_axis: what the last axis means.
+
+    Raises:
+        InputError: the last axis does not have N+1 entries.
+
+    Source: the paper's Eqs. trd-array, trd-equiv and trd-binned-array.
+
+    >>> down = RewardDecomposition([0.95, 1.76, 0.81], TimeAxis(0.95, horizon=2, width=2))
+    >>> round(float(down.value), 2), float(down.residual)
+    (3.52, 0.81)
+    """
+
+    components: FloatArray
+    time_axis: TimeAxis
+
+    def __post_init__(self) -> None:
+        components = np.array(self.components, copy=True)
+        if components.dtype.kind != "f":
+            components = components.astype(np.float64)
+        expected = self.time_axis.num_components
+        if components.ndim == 0 or components.shape[-1] != expected:
+            raise InputError(
+                f"The components have shape {components.shape}, but N = "
+                f"{self.time_axis.horizon} needs a last axis of {expected}.",
+                "Give [..., N+1], the residual last.",
+            )
+        components.setflags(write=False)
+        object.__setattr__(self, "components", components)
+
+    @property
+    def value(self) -> FloatArray:
+        """`[...]`: the Q-value or state value, Σ components (the paper's Eq. trd-equiv)."""
+        return np.asarray(self.components.sum(axis=-1))
+
+    @property
+    def residual(self) -> FloatArray:
+        """`[...]`: the discounted reward of all steps from t+N·w on."""
+        return np.asarray(self.components[..., -1])
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape without the component axis."""
+        return self.components.shape[:-1]
+
+    def __len__(self) -> int:
+        if not self.shape:
+            raise TypeError("a single vector of components has no length; see time_axis")
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> "RewardDecomposition":
+        """Selects states, actions or moments; the component axis stays whole."""
+        parts = index if isinstance(index, tuple) else (index,)
+        try:
+            selected = self.components[
+                (*parts, *(() if Ellipsis in parts else (...,)), slice(None))
+            ]
+        except IndexError as error:
+            raise IndexError(
+                f"{index} does not select from shape {self.shape} (the component axis is not "
+                f"indexed: use .components)"
+            ) from error
+        return RewardDecomposition(selected, self.time_axis)
+
+    def __sub__(self, other: "RewardDecomposition") -> "RewardDecomposition":
+        """Returns the contrast, component by component, of two decompositions on one axis."""
+        if not isinstance(other, RewardDecomposition):
+            return NotImplemented
+        if other.time_axis != self.time_axis:
+            raise InputError(
+                f"The time axes differ: {self.time_axis} and {other.time_axis}.",
+                "Regroup one of them, or decompose both on the same axis.",
+            )
+        return RewardDecomposition(self.components - other.components, self.time_axis)
+
+    def regroup(self, width: int) -> "RewardDecomposition":
+        """Returns the same rewards in wider groups; the residual stays as it is.
+
+        Raises:
+            InputError: the last group would be short; the message says which widths fit.
+
+        >>> fine = RewardDecomposition([0, 0.95, 0.9, 0.86, 0.81], TimeAxis(0.95, horizon=4))
+        >>> fine.regroup(2).components.round(2).tolist()
+        [0.95, 1.76, 0.81]
+        """
+        axis = self.time_axis.regrouped(width)
+        groups = self.components[..., :-1].reshape(*self.shape, axis.horizon, -1).sum(axis=-1)
+        return RewardDecomposition(
+            np.concatenate([groups, self.components[..., -1:]], axis=-1), axis
+        )
+
+    def undiscounted(self) -> FloatArray:
+        """Returns `[..., N]`: the expected reward of each explicit step, c_i / γ^i (w = 1 only).
+
+        The residual has no entry: what lies in it cannot be undiscounted (errata P9). An
+        undiscounted total must be solved for separately, and may not exist.
+
+        Raises:
+            InputError: w > 1 (see `undiscounted_bounds`), or γ = 0.
+        """
+        if self.time_axis.width > 1:
+            raise InputError(
+                f"A group of {self.time_axis.width} steps cannot be undiscounted: "
+                "the steps inside it carry different discounts.",
+                "Decompose with w = 1, or ask for undiscounted_bounds.",
+            )
+        self._refuse_gamma_zero()
+        return np.asarray(self.components[..., :-1] / self.time_axis.discounts[:-1])
+
+    def undiscounted_bounds(
+        self, lowest: float = 0.0, highest: float = math.inf
+    ) -> tuple[FloatArray, FloatArray]:
+        """Returns `[..., N+1]` twice: the least and the most undiscounted reward per component.
+
+        They follow from the range of a single reward alone: the sum of a group is least when it
+        is paid as early as possible, and most when as late. A range of one sign is enough
+        (`0, inf` or `-inf, 0`); the residual then has one finite bound.
+
+        Args:
+            lowest: the least reward that a single step can pay.
+            highest: the most that it can pay.
+
+        Raises:
+            InputError: the range bounds nothing (both ends infinite), contradicts the
+                components, or γ = 0.
+
+        >>> group = RewardDecomposition([0.95, 0.81], TimeAxis(0.95, horizon=1, width=2))
+        >>> [bound.round(2).tolist() for bound in group.undiscounted_bounds()]
+        [[0.95, 0.9], [1.0, inf]]
+        """
+        self._refuse_gamma_zero()
+        if math.isinf(lowest) and math.isinf(highest):
+            raise InputError(
+                "Rewards of both signs without a limit bound nothing.",
+                "Give the least or the most that one step can pay.",
+            )
+        if math.isinf(lowest):  # mirror, so that below the low end is always finite
+            mirrored = RewardDecomposition(-self.components, self.time_axis)
+            low, high = mirrored.undiscounted_bounds(-highest, math.inf)
+            return -high, -low
+        weights = self.time_axis.gamma ** np.arange(self.time_axis.width)  # [w]
+        own_start = self.components / self.time_axis.discounts  # [..., N+1], from each own start
+        excess = own_start[..., :-1] - lowest * weights.sum()  # [..., N], above the least there is
+        capacity = (highest - lowest) * weights.sum()
+        if np.any(excess < -1e-9) or np.any(excess > capacity + 1e-9):
+            raise InputError(
+                f"No rewards from {lowest} to {highest} add up to these components.",
+                "Widen the range of a single reward.",
+            )
+        floor = lowest * self.time_axis.width
+        low = floor + _filled(excess, weights, highest - lowest)
+        high = floor + _filled(excess, weights[::-1], highest - lowest)
+        tail = own_start[..., -1:]
+        one_sign = lowest >= 0.0
+        tail_low = tail if one_sign else np.full_like(tail, -np.inf)
+        tail_high = np.where(tail == 0.0, 0.0, np.inf) if one_sign else np.full_like(tail, np.inf)
+        return (
+            np.concatenate([low, tail_low], axis=-1),
+            np.concatenate([high, tail_high], axis=-1),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns plain Python data at full precision, with the version of its schema."""
+        axis = self.time_axis
+        return {
+            "schema": SCHEMA,
+            "gamma": axis.gamma,
+            "N": axis.horizon,
+            "w": axis.width,
+            "components": self.components.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Returns the decomposition that `to_dict` wrote.
+
+        Raises:
+            InputError: another schema, or a field is missing.
+        """
+        if data.get("schema") != SCHEMA:
+            raise InputError(
+                f"The schema is {data.get('schema')!r}.", f"This version reads {SCHEMA!r}."
+            )
+        try:
+            axis = TimeAxis(data["gamma"], data["N"], data["w"])
+            return cls(np.asarray(data["components"], dtype=np.float64), axis)
+        except KeyError as error:
+            raise InputError(f"The field {error} is missing.", "Write it with to_dict.") from error
+
+    def __rich__(self) -> "Table | str":
+        from rich.table import Table
+
+        if len(self.shape) > 1:
+            return repr(self)
+        table = Table(*self.time_axis.labels, "value", title=_axis_text(self.time_axis))
+        for column in table.columns:
+            column.justify = "right"
+        for row in self._text_rows():
+            table.add_row(*row)
+        return table
+
+    def _repr_html_(self) -> str:
+        if len(self.shape) > 1:
+            return f"<code>{repr(self).replace('<', '&lt;')}</code>"
+        head = "".join(f"<th>{label}</th>" for label in (*self.time_axis.labels, "value"))
+        body = "".join(
+            "<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>"
+            for row in self._text_rows()
+        )
+        caption = f"<caption>{_axis_text(self.time_axis)}</caption>"
+        return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+    def __repr__(self) -> str:
+        if len(self.shape) > 1 or self.time_axis.horizon > 12:
+            return f"RewardDecomposition(shape={self.components.shape}, {self.time_axis})"
+        return f"RewardDecomposition({self.components.tolist()}, {self.time_axis})"
+
+    def _text_rows(self) -> list[list[str]]:
+        rows = np.atleast_2d(np.concatenate([self.components, self.value[..., None]], axis=-1))
+        decimals = decimals_for(rows.ravel())
+        return [[number(v, decimals) for v in row] for row in rows]
+
+    def _refuse_gamma_zero(self) -> None:
+        if self.time_axis.gamma == 0.0:
+            raise InputError(
+                "With gamma = 0 later rewards are worth nothing and cannot be read back.",
+                "Decompose with gamma above 0.",
+            )
+
+
+def _filled(excess: FloatArray, weights: FloatArray, room: float) -> FloatArray:
+    """Returns the undiscounted sum if `excess` is paid into the steps in the order of `weights`."""
+    paid = np.zeros_like(excess)
+    left = np.maximum(excess, 0.0)
+    for weight in weights:
+        here = np.minimum(left / weight, room)
+        paid = paid + here
+        left = np.maximum(left - here * weight, 0.0)
+    return paid
+
+
+def _axis_text(axis: TimeAxis) -> str:
+    return f"γ = {axis.gamma:g}, N = {axis.horizon}, w = {axis.width}"

@@ -1,0 +1,48 @@
+"""The errors trdlab raises: each names its cause, the value, and the cure."""
+
+from collections.abc import Iterable
+
+
+class TrdlabError(Exception):
+    """Base class of every error raised on purpose; the command line exits with `exit_code`.
+
+    Args:
+        cause: what went wrong, with the offending value.
+        cure: what to do about it, if there is something to do.
+    """
+
+    exit_code = 1
+
+    def __init__(self, cause: str, cure: str = "") -> None:
+        super().__init__(f"{cause} {cure}".strip())
+        self.cause = cause
+        self.cure = cure
+
+
+class InputError(TrdlabError, ValueError):
+    """A value given by the caller cannot be used."""
+
+    exit_code = 2
+
+
+class MapError(InputError):
+    """A gridworld map cannot be read, or cannot be played."""
+
+
+class OutputError(InputError):
+    """A result cannot be written where it was asked for."""
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """Returns the cure for a misspelt name: the nearest known one, or all of them.
+
+    >>> closest("dron", ["drone", "bridge"])
+    "Did you mean 'drone'?"
+    >>> closest("xyz", ["drone", "bridge"])
+    'Known: bridge, drone.'
+    """
+    from difflib import get_close_matches
+
+    options = sorted(known)
+    near = get_close_matches(name, options, n=1)
+    return f"Did you mean '{near[0]}'?" if near else f"Known: {', '.join(options)}."

@@ -1,0 +1,1 @@
+"""Explanations: an Estimator's decompositions in, findings with their evidence out."""

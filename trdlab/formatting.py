@@ -1,0 +1,78 @@
+"""How numbers look: one precision for all numbers that are read together."""
+
+import math
+from collections.abc import Iterable
+
+_SMALLEST_FIXED = 1e-4
+_LARGEST_FIXED = 1e7
+
+
+def decimals_for(values: Iterable[float]) -> int:
+    """Returns the decimals at which a group of numbers is read: two, or more if all are small.
+
+    >>> decimals_for([0, 0.95, 3.258]), decimals_for([0, 0.0123])
+    (2, 4)
+    """
+    largest = max((abs(v) for v in values if math.isfinite(v)), default=0.0)
+    if largest == 0.0 or largest >= 0.1:
+        return 2
+    return 2 - math.floor(math.log10(max(largest, _SMALLEST_FIXED)))
+
+
+def decimals_between(a: float, b: float) -> int:
+    """Returns the decimals at which two different numbers look different (at most 9).
+
+    >>> decimals_between(3.26, 3.52), decimals_between(3.2601, 3.2604)
+    (2, 4)
+    """
+    decimals = decimals_for((a, b))
+    while decimals < 9 and f"{a:.{decimals}f}" == f"{b:.{decimals}f}":
+        decimals += 1
+    return decimals
+
+
+def number(value: float, decimals: int = 2) -> str:
+    """Returns a number as it is printed: an exact zero is `0`, all else has fixed decimals.
+
+    >>> number(3.2580), number(0.0), number(-0.001), number(2.5e-9, 4)
+    ('3.26', '0', '0.00', '2.5e-09')
+    """
+    if value == 0.0:
+        return "0"
+    if not math.isfinite(value):
+        return "none" if math.isnan(value) else ("-" if value < 0 else "") + "inf"
+    if abs(value) >= _LARGEST_FIXED or (decimals > 2 and abs(value) < 0.1**decimals / 2):
+        return f"{value:.2g}" if abs(value) < 1 else f"{value:.3e}"
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def amount(value: float) -> str:
+    """Returns a reward as people write it: whole numbers without decimals.
+
+    >>> amount(4.0000000001), amount(4.327), amount(-1.0)
+    ('4', '4.33', '-1')
+    """
+    if math.isfinite(value) and abs(value) < _LARGEST_FIXED and abs(value - round(value)) < 1e-9:
+        return str(round(value))
+    return number(value, decimals_for([value]))
+
+
+def significant(value: float, digits: int = 5) -> str:
+    """Returns a number with a fixed count of significant digits, trailing zeros kept.
+
+    >>> significant(0.868876), significant(4.327012)
+    ('0.86888', '4.3270')
+    """
+    return f"{value:#.{digits}g}"
+
+
+def vector(values: Iterable[float]) -> str:
+    """Returns a reward vector as the paper prints it.
+
+    >>> vector([0, 0, 3.258])
+    '[0, 0, 3.26]'
+    """
+    row = list(values)
+    decimals = decimals_for(row)
+    return "[" + ", ".join(number(v, decimals) for v in row) + "]"

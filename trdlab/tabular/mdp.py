@@ -1,0 +1,180 @@
+"""A finite Markov decision process, stored as the list of its transitions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class MDP:
+    """S states, A actions, K transitions; row s·A + a holds the transitions of action a in s.
+
+    A terminated transition pays its reward and ends the episode: nothing follows from its next
+    state, whatever that state's own row says.
+
+    Args:
+        offsets: `[S·A + 1]`, where each row starts among the transitions.
+        next_states: `[K]`, s′.
+        probabilities: `[K]`, P(s′ | s, a); each row sums to 1.
+        rewards: `[K]`, E[R | s, a, s′].
+        terminated: `[K]`, whether the transition ends the episode.
+        num_actions: A.
+        start: the state in which episodes begin.
+
+    Raises:
+        InputError: a row is empty or does not sum to 1, a probability is negative, a number is
+            not finite, or a state does not exist.
+    """
+
+    offsets: IntArray
+    next_states: IntArray
+    probabilities: FloatArray
+    rewards: FloatArray
+    terminated: BoolArray
+    num_actions: int
+    start: int = 0
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.rewards).all() or not np.isfinite(self.probabilities).all():
+            raise InputError("A reward or probability is not a finite number.", "Check the model.")
+        if np.any(np.diff(self.offsets) <= 0):
+            row = int(np.argmax(np.diff(self.offsets) <= 0))
+            raise InputError(f"{self._row_name(row)} has no transition.", "Give it at least one.")
+        if np.any(self.probabilities < 0.0):
+            row = self._row_of(int(np.argmax(self.probabilities < 0.0)))
+            raise InputError(
+                f"{self._row_name(row)} has a negative probability.", "Check the model."
+            )
+        sums = np.add.reduceat(self.probabilities, self.offsets[:-1])
+        if np.any(np.abs(sums - 1.0) > 1e-9):
+            row = int(np.argmax(np.abs(sums - 1.0)))
+            raise InputError(
+                f"The probabilities of {self._row_name(row)} sum to {sums[row]:.12g}.",
+                "They must sum to 1.",
+            )
+        if np.any((self.next_states < 0) | (self.next_states >= self.num_states)):
+            raise InputError(
+                "A transition leads to a state that does not exist.", "Check the model."
+            )
+        if not 0 <= self.start < self.num_states:
+            raise InputError(
+                f"The start state {self.start} does not exist.",
+                f"States run from 0 to {self.num_states - 1}.",
+            )
+
+    @classmethod
+    def from_transitions(
+        cls,
+        transitions: Sequence[Sequence[Sequence[tuple[float, int, float, bool]]]],
+        start: int = 0,
+    ) -> "MDP":
+        """Builds a model from `transitions[s][a]`, a list of (probability, s′, reward, terminated).
+
+        This is the layout of the `P` table of Gymnasium's toy-text environments.
+
+        >>> coin = MDP.from_transitions([[[(1.0, 0, 1.0, True)], [(1.0, 0, 0.0, False)]]])
+        >>> coin.num_states, coin.num_actions, coin.expected_rewards.tolist()
+        (1, 2, [[1.0, 0.0]])
+        """
+        rows = [row for actions in transitions for row in actions]
+        flat = [transition for row in rows for transition in row]
+        if not flat:
+            raise InputError("The model has no transition.", "Give each state and action one.")
+        probabilities, next_states, rewards, terminated = zip(*flat, strict=True)
+        return cls(
+            offsets=np.cumsum([0, *map(len, rows)]),
+            next_states=np.array(next_states, dtype=np.int64),
+            probabilities=np.array(probabilities, dtype=np.float64),
+            rewards=np.array(rewards, dtype=np.float64),
+            terminated=np.array(terminated, dtype=np.bool_),
+            num_actions=len(transitions[0]),
+            start=start,
+        )
+
+    @property
+    def num_states(self) -> int:
+        """S."""
+        return (len(self.offsets) - 1) // self.num_actions
+
+    @cached_property
+    def continuation(self) -> FloatArray:
+        """`[K]`: the probability of each transition, zero where the episode ends."""
+        return np.where(self.terminated, 0.0, self.probabilities)
+
+    @cached_property
+    def transition_states(self) -> IntArray:
+        """`[K]`: the state each transition leaves."""
+        return np.repeat(np.arange(self.num_states), np.diff(self.offsets[:: self.num_actions]))
+
+    @cached_property
+    def transition_actions(self) -> IntArray:
+        """`[K]`: the action of each transition."""
+        rows = np.arange(self.num_states * self.num_actions)
+        return np.repeat(rows % self.num_actions, np.diff(self.offsets))
+
+    @cached_property
+    def expected_rewards(self) -> FloatArray:
+        """`[S, A]`: E[R | s, a]."""
+        return self.per_action(self.probabilities * self.rewards)
+
+    @cached_property
+    def leaves_state(self) -> BoolArray:
+        """`[S, A]`: whether an action can lead anywhere but back to its own state."""
+        moves = (self.next_states != self.transition_states) & (self.probabilities > 0.0)
+        return self.per_action(moves.astype(np.float64)) > 0.0
+
+    @cached_property
+    def terminal_states(self) -> BoolArray:
+        """`[S]`: states that no unterminated transition enters and whose rows all terminate."""
+        goes_on = np.zeros(self.num_states, dtype=np.bool_)
+        goes_on[self.transition_states[self.continuation > 0.0]] = True
+        goes_on[self.next_states[self.continuation > 0.0]] = True
+        goes_on[self.start] = True
+        return ~goes_on
+
+    def expect(self, values: FloatArray) -> FloatArray:
+        """Returns `[S, A]`: the expected `values [S]` of the next state, 0 once terminated."""
+        return self.per_action(self.continuation * values[self.next_states])
+
+    def per_state(self, per_transition: FloatArray) -> FloatArray:
+        """Returns `[S]`: the sums of `per_transition [K]` over all actions of a state."""
+        return np.asarray(np.add.reduceat(per_transition, self.offsets[: -1 : self.num_actions]))
+
+    def with_rewards(self, rewards: FloatArray) -> "MDP":
+        """Returns the same dynamics with other rewards `[K]`."""
+        return replace(self, rewards=rewards)
+
+    def per_action(self, per_transition: FloatArray) -> FloatArray:
+        """Returns `[S, A]`: the sums of `per_transition [K]` over the rows."""
+        sums = np.add.reduceat(per_transition, self.offsets[:-1])
+        return np.asarray(sums.reshape(self.num_states, self.num_actions))
+
+    def _row_of(self, transition: int) -> int:
+        return int(np.searchsorted(self.offsets, transition, side="right")) - 1
+
+    def _row_name(self, row: int) -> str:
+        return f"State {row // self.num_actions}, action {row % self.num_actions}"
+
+
+def as_policy(probabilities: Any, mdp: MDP) -> FloatArray:
+    """Returns a stochastic policy `[S, A]`, checked against the model.
+
+    Raises:
+        InputError: wrong shape, or a row that is no probability distribution.
+    """
+    policy = np.asarray(probabilities, dtype=np.float64)
+    shape = (mdp.num_states, mdp.num_actions)
+    if policy.shape != shape:
+        raise InputError(f"The policy has shape {policy.shape}.", f"The model needs {shape}.")
+    if not np.all(policy >= 0.0) or np.any(np.abs(policy.sum(axis=1) - 1.0) > 1e-9):
+        raise InputError(
+            "A row of the policy is not a probability distribution.",
+            "Each state's action probabilities must be at least 0 and sum to 1.",
+        )
+    return policy

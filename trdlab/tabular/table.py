@@ -1,0 +1,126 @@
+"""Decompositions of every state and action of a model, as an Estimator."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.errors import InputError
+from trdlab.estimator import Future
+from trdlab.tabular.mdp import MDP, as_policy
+from trdlab.tabular.solve import Solution, Ties, evaluate, optimal
+
+_TIED_POLICIES = {
+    "lowest": "the optimal policy",
+    "mixed": "the optimal policy that mixes tied actions evenly",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ExactTable:
+    """The exact decomposition `[S, A, N+1]` of a model's future under one policy; an Estimator.
+
+    Args:
+        mdp: the model.
+        solution: the policy, its values, their error bound and the ties.
+        decomposition: `[S, A, N+1]`.
+        future: whose future it is.
+    """
+
+    mdp: MDP
+    solution: Solution
+    decomposition: RewardDecomposition
+    future: Future
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """What the components mean."""
+        return self.decomposition.time_axis
+
+    def decompose(self, observations: Any) -> RewardDecomposition:
+        """Returns `[B, A, N+1]` for a batch `[B]` of state indices.
+
+        Raises:
+            InputError: an observation is not the index of a state.
+        """
+        states = np.asarray(observations)
+        if states.dtype.kind not in "iu":
+            raise InputError(
+                f"The observations have type {states.dtype}.", "A table takes state indices."
+            )
+        if states.size and not 0 <= states.min() <= states.max() < self.mdp.num_states:
+            raise InputError(
+                f"The observations run from {states.min()} to {states.max()}.",
+                f"States run from 0 to {self.mdp.num_states - 1}.",
+            )
+        return self.decomposition[states]
+
+    @cached_property
+    def state_decomposition(self) -> RewardDecomposition:
+        """`[S, N+1]`: the decomposition of the state values (paper, Appendix A)."""
+        weighted = self.solution.policy[..., None] * self.decomposition.components
+        return RewardDecomposition(weighted.sum(axis=1), self.time_axis)
+
+    @cached_property
+    def ambiguous(self) -> BoolArray:
+        """`[S]`: states where optimal actions tie and their decompositions differ.
+
+        Where no state is ambiguous, every tied optimal policy has the same decomposition: the
+        vectors then obey one linear equation, whichever of the tied actions is taken.
+        """
+        tied = self.solution.tied[..., None]
+        components = self.decomposition.components
+        high = np.where(tied, components, -np.inf).max(axis=1)
+        low = np.where(tied, components, np.inf).min(axis=1)
+        slack = 1e-9 * np.maximum(1.0, np.abs(components).max())
+        return np.asarray((high - low).max(axis=1) > slack) & tied[..., 0].any(axis=1)
+
+
+def exact(
+    mdp: MDP, time_axis: TimeAxis, *, policy: FloatArray | None = None, ties: Ties = "lowest"
+) -> ExactTable:
+    """Solves a model and decomposes the Q-value of every state and action exactly.
+
+    With C = P·(1 − terminated) and x^π(s) = Σ_a π(a|s) x(s, a), the expected discounted rewards of
+    single steps are m_0 = E[R | s, a] and m_i = γ·C·m^π_(i−1). Groups are sums of them, and the
+    residual is (γC)^(N·w) applied to Q: it is not taken as a difference, so that the components
+    summing to Q is a check and not a tautology.
+
+    Args:
+        mdp: the model.
+        time_axis: γ, N and w.
+        policy: `[S, A]`, a policy to evaluate; without one, the optimal policy is solved for.
+        ties: whose future is told where optimal actions tie.
+
+    Raises:
+        InputError: `policy` is no policy of this model.
+
+    Source: the paper's Eqs. trd-array and trd-binned-array, and Appendix A.
+
+    >>> coin = MDP.from_transitions([[[(1.0, 0, 0.0, False)], [(1.0, 0, 2.0, True)]]])
+    >>> exact(coin, TimeAxis(0.5, horizon=2)).decomposition.components[0].tolist()
+    [[0.0, 1.0, 0.0], [2.0, 0.0, 0.0]]
+    """
+    gamma = time_axis.gamma
+    if policy is None:
+        solution, whose = optimal(mdp, gamma, ties=ties), _TIED_POLICIES[ties]
+    else:
+        solution, whose = evaluate(mdp, as_policy(policy, mdp), gamma), "the given policy"
+    components = decompose(mdp, solution, time_axis)
+    return ExactTable(mdp, solution, RewardDecomposition(components, time_axis), Future(whose))
+
+
+def decompose(mdp: MDP, solution: Solution, time_axis: TimeAxis) -> FloatArray:
+    """Returns `[S, A, N+1]`: the components of a solved policy's future (see `exact`)."""
+    gamma, policy = time_axis.gamma, solution.policy
+    components = np.zeros((mdp.num_states, mdp.num_actions, time_axis.num_components))
+    step_reward, beyond = mdp.expected_rewards, solution.q_values  # both [S, A]
+    for step in range(time_axis.num_steps):
+        components[..., step // time_axis.width] += step_reward
+        step_reward = gamma * mdp.expect((policy * step_reward).sum(axis=1))
+        beyond = gamma * mdp.expect((policy * beyond).sum(axis=1))
+    components[..., -1] = beyond
+    return components

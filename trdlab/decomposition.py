@@ -81,8 +81,10 @@ class TimeAxis:
         """Returns the steps of a component as text: `t+1`, `t+2…t+3`, or `t+4…∞`."""
         start, steps = self.start(component), self.steps(component)
         if steps is None:
-            return f"{_step(start)}…∞"
-        return _step(start) if self.width == 1 else f"{_step(start)}…{_step(steps[-1])}"
+            return f"{step_label(start)}…∞"
+        return (
+            step_label(start) if self.width == 1 else f"{step_label(start)}…{step_label(steps[-1])}"
+        )
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -124,7 +126,8 @@ class TimeAxis:
         return component
 
 
-def _step(offset: int) -> str:
+def step_label(offset: int) -> str:
+    """Returns an agent step as text: `t`, `t+1`."""
     return "t" if offset == 0 else f"t+{offset}"
 
 

@@ -26,7 +26,7 @@ def decimals_between(a: float, b: float) -> int:
     (2, 4)
     """
     decimals = decimals_for((a, b))
-    while decimals < 9 and f"{a:.{decimals}f}" == f"{b:.{decimals}f}":
+    while a != b and decimals < 9 and f"{a:.{decimals}f}" == f"{b:.{decimals}f}":
         decimals += 1
     return decimals
 
@@ -47,7 +47,7 @@ def number(value: float, decimals: int = 2) -> str:
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
-def amount(value: float) -> str:
+def amount(value: float, decimals: int | None = None) -> str:
     """Returns a reward as people write it: whole numbers without decimals.
 
     >>> amount(4.0000000001), amount(4.327), amount(-1.0)
@@ -55,7 +55,16 @@ def amount(value: float) -> str:
     """
     if math.isfinite(value) and abs(value) < _LARGEST_FIXED and abs(value - round(value)) < 1e-9:
         return str(round(value))
-    return number(value, decimals_for([value]))
+    return number(value, decimals_for([value]) if decimals is None else decimals)
+
+
+def plain(value: float) -> str:
+    """Returns a given number, such as γ, with as many digits as it needs (at most 12).
+
+    >>> plain(0.95), plain(4.0), plain(0.999999)
+    ('0.95', '4', '0.999999')
+    """
+    return f"{value:.12g}"
 
 
 def significant(value: float, digits: int = 5) -> str:

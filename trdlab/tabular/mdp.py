@@ -1,7 +1,8 @@
 """A finite Markov decision process, stored as the list of its transitions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -147,8 +148,17 @@ class MDP:
         return np.asarray(np.add.reduceat(per_transition, self.offsets[: -1 : self.num_actions]))
 
     def with_rewards(self, rewards: FloatArray) -> "MDP":
-        """Returns the same dynamics with other rewards `[K]`."""
-        return replace(self, rewards=rewards)
+        """Returns the same dynamics with other rewards `[K]`.
+
+        Raises:
+            InputError: a reward is not finite.
+        """
+        if not np.isfinite(rewards).all():
+            raise InputError("A reward is not a finite number.", "Check the model.")
+        other = copy(self)  # with what is derived from the dynamics, but not from the rewards
+        object.__setattr__(other, "rewards", rewards)
+        other.__dict__.pop("expected_rewards", None)
+        return other
 
     def per_action(self, per_transition: FloatArray) -> FloatArray:
         """Returns `[S, A]`: the sums of `per_transition [K]` over the rows."""

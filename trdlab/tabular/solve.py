@@ -14,6 +14,7 @@ Ties = Literal["lowest", "mixed"]
 
 _UNIT = float(np.finfo(np.float64).eps)
 _DENSE_STATES = 500  # up to here a dense solve is done before scipy could be imported
+_QUICK_GAIN = 1e-13  # relative
 _MAX_SWEEPS = 2_000
 _MAX_IMPROVEMENTS = 10_000
 
@@ -30,6 +31,7 @@ class Solution:
         tied: `[S, A]`, the optimal actions of each state where several cannot be told apart
             within twice the bound. All false where the best action is unique, in terminal
             states, and for a given policy.
+        is_optimal: whether the policy was solved for, not given.
     """
 
     gamma: float
@@ -37,6 +39,7 @@ class Solution:
     q_values: FloatArray
     error_bound: FloatArray
     tied: BoolArray
+    is_optimal: bool = False
 
     @property
     def state_values(self) -> FloatArray:
@@ -44,9 +47,7 @@ class Solution:
         return np.asarray((self.policy * self.q_values).sum(axis=1))
 
 
-def optimal(
-    mdp: MDP, gamma: float, *, ties: Ties = "lowest", initial_policy: FloatArray | None = None
-) -> Solution:
+def optimal(mdp: MDP, gamma: float, *, ties: Ties = "lowest") -> Solution:
     """Solves for the optimal values: value-iteration sweeps, then policy iteration to the end.
 
     Where optimal actions tie, Q is unique but the future is not. `ties` says whose it is:
@@ -56,16 +57,13 @@ def optimal(
         mdp: the model.
         gamma: the discount factor, in [0, 1).
         ties: how to choose among tied optimal actions.
-        initial_policy: `[S, A]`, a policy to improve on, in place of the sweeps.
 
     Raises:
         InputError: γ is outside [0, 1).
     """
     TimeAxis(gamma, 0)
-    actions = (
-        _greedy_after_sweeps(mdp, gamma) if initial_policy is None else initial_policy.argmax(1)
-    )
-    solution = _improved(mdp, gamma, actions)
+    actions, _ = improved(mdp, gamma, _greedy_after_sweeps(mdp, gamma))
+    solution = _surely_improved(mdp, gamma, actions)
     bound = _optimality_bound(solution)
     near = solution.q_values + bound >= (solution.q_values - bound).max(axis=1, keepdims=True)
     policy = near / near.sum(axis=1, keepdims=True) if ties == "mixed" else _lowest(near)
@@ -78,6 +76,7 @@ def optimal(
         q_values=solution.q_values,
         error_bound=np.maximum(bound, solution.error_bound),
         tied=near & several[:, None],
+        is_optimal=True,
     )
 
 
@@ -131,8 +130,36 @@ def _greedy_after_sweeps(mdp: MDP, gamma: float) -> IntArray:
     return actions
 
 
-def _improved(mdp: MDP, gamma: float, actions: IntArray) -> Solution:
-    """Policy iteration: changes an action only where that is surely better, so it must end."""
+def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, FloatArray]:
+    """Policy iteration from given actions, as far as gains stand out from rounding.
+
+    It is the quick way to follow an optimum while the model changes a little; it proves nothing.
+
+    Args:
+        mdp: the model.
+        gamma: the discount factor, in [0, 1).
+        actions: `[S]`, a deterministic policy to start from.
+
+    Returns:
+        Optimal actions `[S]` and their Q-values `[S, A]`.
+    """
+    states = np.arange(mdp.num_states)
+    for _ in range(_MAX_IMPROVEMENTS):
+        taken = actions[mdp.transition_states] == mdp.transition_actions
+        rewards = mdp.expected_rewards[states, actions]
+        values = _solve_chain(mdp, gamma * mdp.continuation * taken, rewards)
+        q_values = mdp.expected_rewards + gamma * mdp.expect(values)
+        own = q_values[states, actions]
+        best = q_values.argmax(axis=1)
+        better = q_values[states, best] > own + _QUICK_GAIN * np.abs(own)
+        if not better.any():
+            break
+        actions = np.where(better, best, actions)
+    return actions, q_values
+
+
+def _surely_improved(mdp: MDP, gamma: float, actions: IntArray) -> Solution:
+    """Policy iteration that changes an action only where it is proven better, so it must end."""
     for _ in range(_MAX_IMPROVEMENTS):
         policy = np.zeros((mdp.num_states, mdp.num_actions))
         policy[np.arange(mdp.num_states), actions] = 1.0

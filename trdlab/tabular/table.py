@@ -1,6 +1,6 @@
 """Decompositions of every state and action of a model, as an Estimator."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -109,8 +109,11 @@ def exact(
         solution, whose = optimal(mdp, gamma, ties=ties), _TIED_POLICIES[ties]
     else:
         solution, whose = evaluate(mdp, as_policy(policy, mdp), gamma), "the given policy"
-    components = decompose(mdp, solution, time_axis)
-    return ExactTable(mdp, solution, RewardDecomposition(components, time_axis), Future(whose))
+    components = RewardDecomposition(decompose(mdp, solution, time_axis), time_axis)
+    table = ExactTable(mdp, solution, components, Future(whose))
+    if ties == "lowest" and table.ambiguous.any():
+        return replace(table, future=Future(f"{whose} (of tied actions the first)"))
+    return table
 
 
 def decompose(mdp: MDP, solution: Solution, time_axis: TimeAxis) -> FloatArray:

@@ -1,0 +1,137 @@
+"""The moment that is explained: every action's decomposition, and what is known about it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.errors import InputError, closest
+from trdlab.estimator import Future
+
+RELATIVE_ZERO = 1e-12
+"""Two components closer than this, relative to the larger, are the same number."""
+
+
+@dataclass(frozen=True, eq=False)
+class WhatIf:
+    """One quantity of the world that can be varied: γ, or what a source of reward pays.
+
+    Args:
+        name: `γ`, or the source, for example `the treasure`.
+        current: its present value.
+        low: the least value to consider.
+        high: the largest value to consider.
+        q_values: maps a value to the Q-values `[A]` of the moment, the policy re-optimised.
+    """
+
+    name: str
+    current: float
+    low: float
+    high: float
+    q_values: Callable[[float], FloatArray]
+
+    def gap(self, action: int, foil: int, value: float) -> float:
+        """Returns Q(action) − Q(foil) at a value, 0 where they differ only by rounding."""
+        q_values = self.q_values(value)
+        a, b = float(q_values[action]), float(q_values[foil])
+        return 0.0 if same(a, b) else a - b
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What an agent expects of each action, here and now.
+
+    Args:
+        decomposition: `[A, N+1]`.
+        action_names: A names.
+        future: whose future it is, in which reward, and what ends it.
+        policy: `[A]`, the probability of each action under the policy; None if not known.
+        totals: `[A]`, undiscounted totals of the same policy, NaN where none exists; None where
+            they cannot be known (no exact model).
+        changes_state: `[A]`, whether an action can lead to another state; None if not known.
+        tied: the names of the optimal actions here, if several tie and their futures differ.
+        tied_later: the number of later states where that is so.
+        what_ifs: the quantities that can be varied, where there is a model to solve again.
+    """
+
+    decomposition: RewardDecomposition
+    action_names: tuple[str, ...]
+    future: Future
+    policy: FloatArray | None = None
+    totals: FloatArray | None = None
+    changes_state: tuple[bool, ...] | None = None
+    tied: tuple[str, ...] = ()
+    tied_later: int = 0
+    what_ifs: tuple[WhatIf, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.decomposition.shape != (len(self.action_names),):
+            raise InputError(
+                f"The decomposition has shape {self.decomposition.shape}, there are "
+                f"{len(self.action_names)} action names.",
+                "A moment is [A, N+1], with a name for each action.",
+            )
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """What the components mean."""
+        return self.decomposition.time_axis
+
+    def index(self, action: str) -> int:
+        """Returns the number of an action.
+
+        Raises:
+            InputError: there is no such action; the message suggests one.
+        """
+        if action not in self.action_names:
+            raise InputError(f"There is no action '{action}'.", closest(action, self.action_names))
+        return self.action_names.index(action)
+
+    def components(self, action: str) -> FloatArray:
+        """`[N+1]`: the components of one action."""
+        return self.decomposition.components[self.index(action)]
+
+    @cached_property
+    def q_values(self) -> FloatArray:
+        """`[A]`."""
+        return self.decomposition.value
+
+    def q_value(self, action: str) -> float:
+        """Returns the Q-value of one action."""
+        return float(self.q_values[self.index(action)])
+
+    def total(self, action: str) -> float:
+        """Returns the undiscounted total of one action, NaN where none exists or is known."""
+        return float("nan") if self.totals is None else float(self.totals[self.index(action)])
+
+    def pair(self, action: str | None, foil: str | None) -> tuple[str, str | None]:
+        """Returns the action to explain and its foil, filling in what was not asked for.
+
+        By default these are what the policy does and the best other action. Neither is an action
+        that surely leaves the state as it is: a bump into a wall is worth γ times the best
+        action, often more than any real alternative, and contrasts with nothing. Where no second
+        action changes the state there is no foil.
+
+        Raises:
+            InputError: there is no such action, or action and foil are the same.
+        """
+        for name in (action, foil):
+            if name is not None:
+                self.index(name)
+        if action is not None and action == foil:
+            raise InputError(f"Action and foil are both '{action}'.", "Name two different actions.")
+        moving = self.changes_state or (True,) * len(self.action_names)
+        likely = np.zeros(len(self.action_names)) if self.policy is None else self.policy
+        order = np.lexsort((-self.q_values, -likely))  # by probability, then by value
+        options = [self.action_names[a] for a in order if moving[a]]
+        best = self.action_names[order[0]]
+        action = action or next((name for name in options if name != foil), best)
+        return action, foil or next((name for name in options if name != action), None)
+
+
+def same(a: float, b: float) -> bool:
+    """Returns whether two computed numbers are the same up to rounding."""
+    return abs(a - b) <= RELATIVE_ZERO * max(abs(a), abs(b))

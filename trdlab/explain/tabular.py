@@ -1,0 +1,106 @@
+"""Moments of exactly solved models, where everything that can be known is known."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.explain.moment import Moment, WhatIf
+from trdlab.gridworld import Gridworld, Source
+from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
+
+GAMMA_RANGE = (0.01, 0.99)
+REWARD_RANGE = 10.0
+"""How many times its present value a source of reward is varied up to, from zero on."""
+
+
+def tabular_moment(
+    table: ExactTable, state: int, action_names: Sequence[str], what_ifs: Sequence[WhatIf] = ()
+) -> Moment:
+    """Returns what a solved model expects in one state, with undiscounted totals and ties.
+
+    Args:
+        table: the exact decomposition.
+        state: the index of the state.
+        action_names: A names.
+        what_ifs: quantities that can be varied.
+    """
+    solution, mdp = table.solution, table.mdp
+    here = bool(table.ambiguous[state])
+    return Moment(
+        decomposition=table.decomposition[state],
+        action_names=tuple(action_names),
+        future=table.future,
+        policy=solution.policy[state],
+        totals=undiscounted_totals(mdp, solution.policy)[state],
+        changes_state=tuple(bool(moves) for moves in mdp.leaves_state[state]),
+        tied=tuple(action_names[a] for a in np.flatnonzero(solution.tied[state])) if here else (),
+        tied_later=int((table.ambiguous & _later(table, state)).sum()) - here,
+        what_ifs=tuple(what_ifs),
+    )
+
+
+def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
+    """Returns what a solved gridworld expects in one state; under the optimal policy also what-ifs.
+
+    Args:
+        world: the gridworld.
+        table: its exact decomposition.
+        state: the index of the state.
+    """
+    what_ifs: list[WhatIf] = []
+    if table.solution.is_optimal:
+        gamma, mdp = table.time_axis.gamma, world.mdp
+        solver = _Resolved(state, lambda value: (mdp, value))
+        what_ifs.append(WhatIf("γ", gamma, *GAMMA_RANGE, solver))
+        for source in (source for source in world.sources if source.value):
+            solver = _Resolved(state, lambda value, s=source: (world.mdp_if(s, value), gamma))  # type: ignore[misc]
+            low, high = sorted((0.0, REWARD_RANGE * source.value))
+            what_ifs.append(WhatIf(source_name(world, source), source.value, low, high, solver))
+    return tabular_moment(table, state, world.action_names, what_ifs)
+
+
+def source_name(world: Gridworld, source: Source) -> str:
+    """Returns how a source of reward is called in a sentence.
+
+    >>> from trdlab.gridworld import load_map
+    >>> world = Gridworld(load_map("drone"))
+    >>> [source_name(world, source) for source in world.sources]
+    ['the reward for each coin', 'the reward for the treasure']
+    """
+    if source.kind == "step":
+        return "the reward for each step"
+    cells = [world.grid.legend[symbol] for row in world.grid.rows for symbol in row]
+    count = sum(cell.kind == source.kind and cell.value == source.value for cell in cells)
+    alike = {other for other in world.sources if other.kind == source.kind}
+    worth = f" of {source.value:g}" if len(alike) > 1 else ""
+    return f"the reward for {'the' if count == 1 else 'each'} {source.kind}{worth}"
+
+
+class _Resolved:
+    """Q-values of one state as one quantity varies, each solve starting from the last actions."""
+
+    def __init__(self, state: int, model: Callable[[float], tuple[MDP, float]]) -> None:
+        self.state, self.model = state, model
+        self.actions: IntArray | None = None
+
+    def __call__(self, value: float) -> FloatArray:
+        mdp, gamma = self.model(value)
+        actions = optimal(mdp, gamma).policy.argmax(1) if self.actions is None else self.actions
+        self.actions, q_values = improved(mdp, gamma, actions)
+        return q_values[self.state]
+
+
+def _later(table: ExactTable, state: int) -> BoolArray:
+    """Returns `[S]`: the states that can follow any first action and optimal ones after it."""
+    mdp, solution = table.mdp, table.solution
+    followed = (solution.policy > 0.0) | solution.tied
+    followed[state] = True
+    edge = (mdp.continuation > 0.0) & followed[mdp.transition_states, mdp.transition_actions]
+    sources, targets = mdp.transition_states[edge], mdp.next_states[edge]
+    reached, size = np.zeros(mdp.num_states, dtype=np.bool_), -1
+    reached[state] = True
+    while reached.sum() != size:
+        size = int(reached.sum())
+        reached[targets[reached[sources]]] = True
+    return reached

@@ -193,10 +193,9 @@ class RewardDecomposition:
     def __getitem__(self, index: Any) -> "RewardDecomposition":
         """Selects states, actions or moments; the component axis stays whole."""
         parts = index if isinstance(index, tuple) else (index,)
+        whole = any(part is Ellipsis for part in parts)  # not `in`: a part may be an array
         try:
-            selected = self.components[
-                (*parts, *(() if Ellipsis in parts else (...,)), slice(None))
-            ]
+            selected = self.components[(*parts, *(() if whole else (...,)), slice(None))]
         except IndexError as error:
             raise IndexError(
                 f"{index} does not select from shape {self.shape} (the component axis is not "

@@ -1,1 +1,38 @@
 """The command line: parse, call, print."""
+
+import sys
+from collections.abc import Sequence
+
+from trdlab.errors import TrdlabError
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Runs `trdlab`; exits with 0, with 2 for wrong usage or input, or with 1 for a failure."""
+    import typer
+
+    from trdlab.cli.app import app, verbose
+
+    usage_error = typer.BadParameter.__bases__[0]  # its class has no public name in all versions
+    try:
+        code = app(arguments, prog_name="trdlab", standalone_mode=False)
+    except TrdlabError as error:
+        if verbose():
+            raise
+        _fail(f"{error.cause} {error.cure}".strip(), error.exit_code)
+    except usage_error as error:
+        path = error.ctx.command_path if error.ctx else "trdlab"  # type: ignore[attr-defined]
+        _fail(f"{error.format_message()} See: {path} --help", 2)  # type: ignore[attr-defined]
+    except typer.Abort:
+        _fail("Interrupted.", 130)
+    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+        sys.stderr.close()
+        sys.exit(0)
+    else:
+        sys.exit(code or 0)
+
+
+def _fail(message: str, code: int) -> None:
+    line = " ".join(message.split())
+    encoding = getattr(sys.stderr, "encoding", None) or "ascii"
+    print("error:", line.encode(encoding, "backslashreplace").decode(encoding), file=sys.stderr)
+    sys.exit(code)

@@ -32,8 +32,7 @@ def contrast(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     """Returns how an action's future differs from its foil's.
 
     In order: the undiscounted totals, which pays sooner, which is worth more, where the running
-    totals cross, the fewest components that justify the better one, and what would flip the
-    preference (the policy re-optimised).
+    totals cross, and the fewest components that justify the better one.
 
     Args:
         moment: the decompositions of every action.
@@ -53,8 +52,29 @@ def contrast(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
         worth,
         *_crossings(moment, action, foil),
         *_reasons(moment, action, foil),
-        *_flips(moment, action, foil),
     )
+
+
+def what_would_flip(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
+    """Returns where the preference flips as each quantity varies, or that it never does.
+
+    The policy is re-optimised at every value. A preference that stays the same but for ties counts
+    as never flipping.
+
+    Raises:
+        InputError: there is no such action.
+    """
+    i, j = moment.index(action), moment.index(foil)
+    found: list[Finding] = []
+    for what_if in moment.what_ifs:
+        name, low, high = what_if.name, what_if.low, what_if.high
+        at = find_flips(lambda x, w=what_if: w.gap(i, j, x), low, high)  # type: ignore[misc]
+        if at:
+            found.append(Flips(action, foil, name, what_if.current, low, high, at))
+        elif not same(moment.q_value(action), moment.q_value(foil)):
+            better, worse = _ordered(moment, action, foil)
+            found.append(NeverFlips(better, worse, name, low, high))
+    return tuple(found)
 
 
 def _totals(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
@@ -132,17 +152,3 @@ def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
         if advantage > against:
             break
     return (Reasons(better, worse, tuple(sorted(chosen)), advantage, against),)
-
-
-def _flips(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
-    i, j = moment.index(action), moment.index(foil)
-    found: list[Finding] = []
-    for what_if in moment.what_ifs:
-        name, low, high = what_if.name, what_if.low, what_if.high
-        at = find_flips(lambda x, w=what_if: w.gap(i, j, x), low, high)  # type: ignore[misc]
-        if at:
-            found.append(Flips(action, foil, name, what_if.current, low, high, at))
-        elif not same(moment.q_value(action), moment.q_value(foil)):
-            better, worse = _ordered(moment, action, foil)
-            found.append(NeverFlips(better, worse, name, low, high))
-    return tuple(found)

@@ -1,12 +1,13 @@
 """The explanation: findings about a moment, ready to be rendered as text, picture or JSON."""
 
 from dataclasses import dataclass
-from typing import Any
 
-from trdlab.explain.contrast import contrast
+from trdlab.explain.contrast import contrast, what_would_flip
 from trdlab.explain.findings import Finding, TiedActions, TiedLater, WhoseFuture
 from trdlab.explain.forecast import forecast
 from trdlab.explain.moment import Moment
+
+Findings = tuple[Finding, ...]
 
 
 @dataclass(frozen=True)
@@ -17,18 +18,24 @@ class Explanation:
         moment: what is explained.
         action: the name of the explained action.
         foil: the name of the action it is contrasted with, None for a forecast alone.
-        findings: what was found, in the order it is told.
+        contrast: how the futures of action and foil differ.
+        flips: what would change the preference between them.
+        forecast: what the action is expected to pay, and when.
+        context: whose future it is, and where ties leave it open.
     """
 
     moment: Moment
     action: str
     foil: str | None
-    findings: tuple[Finding, ...]
+    contrast: Findings
+    flips: Findings
+    forecast: Findings
+    context: Findings
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns action, foil and findings as plain data."""
-        findings = [finding.to_dict() for finding in self.findings]
-        return {"action": self.action, "foil": self.foil, "findings": findings}
+    @property
+    def findings(self) -> Findings:
+        """All of them, in the order they are told."""
+        return self.contrast + self.flips + self.forecast + self.context
 
 
 def explain(moment: Moment, action: str | None = None, foil: str | None = None) -> Explanation:
@@ -36,20 +43,21 @@ def explain(moment: Moment, action: str | None = None, foil: str | None = None) 
 
     Args:
         moment: the decompositions of every action, and what is known beside.
-        action: the name of an action; by default the best one that changes the state.
+        action: the name of an action; by default what the policy does (see `Moment.pair`).
         foil: the name of another; by default the best other one that changes the state.
 
     Raises:
         InputError: there is no such action, or action and foil are the same.
     """
     action, foil = moment.pair(action, foil)
-    findings: list[Finding] = []
-    if foil is not None:
-        findings += contrast(moment, action, foil)
-    findings += forecast(moment, action)
-    findings.append(WhoseFuture(moment.future.policy))
-    if moment.tied:
-        findings.append(TiedActions(moment.tied))
-    if moment.tied_later:
-        findings.append(TiedLater(moment.tied_later))
-    return Explanation(moment, action, foil, tuple(findings))
+    ties: list[Finding] = [TiedActions(moment.tied)] if moment.tied else []
+    later: list[Finding] = [TiedLater(moment.tied_later)] if moment.tied_later else []
+    return Explanation(
+        moment=moment,
+        action=action,
+        foil=foil,
+        contrast=() if foil is None else contrast(moment, action, foil),
+        flips=() if foil is None else what_would_flip(moment, action, foil),
+        forecast=forecast(moment, action),
+        context=(WhoseFuture(moment.future.policy), *ties, *later),
+    )

@@ -52,7 +52,8 @@ def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
     if table.solution.is_optimal:
         gamma, mdp = table.time_axis.gamma, world.mdp
         solver = _Resolved(state, lambda value: (mdp, value))
-        what_ifs.append(WhatIf("γ", gamma, *GAMMA_RANGE, solver))
+        low, high = min(GAMMA_RANGE[0], gamma), max(GAMMA_RANGE[1], gamma)
+        what_ifs.append(WhatIf("γ", gamma, low, high, solver))
         for source in (source for source in world.sources if source.value):
             solver = _Resolved(state, lambda value, s=source: (world.mdp_if(s, value), gamma))  # type: ignore[misc]
             low, high = sorted((0.0, REWARD_RANGE * source.value))

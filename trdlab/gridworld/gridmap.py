@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +12,7 @@ Kind = Literal["floor", "wall", "one-way", "coin", "treasure", "hazard", "founta
 ACTIONS = ("up", "down", "left", "right")
 MOVES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 MAX_CELLS = 10_000
+_FOLDER = Path(__file__).parent / "maps"
 MAX_WIND = 9
 
 _DEFAULT_VALUES = {"coin": 1.0, "treasure": 4.0, "hazard": -1.0, "fountain": 1.0, "exit": 0.0}
@@ -135,9 +135,7 @@ class GridMap:
 
 def map_names() -> tuple[str, ...]:
     """Returns the names of the built-in maps, the paper's first."""
-    found = sorted(
-        p.name.removesuffix(".txt") for p in _folder().iterdir() if p.name.endswith(".txt")
-    )
+    found = sorted(path.stem for path in _FOLDER.glob("*.txt"))
     return ("drone", *(name for name in found if name != "drone"))
 
 
@@ -154,27 +152,22 @@ def load_map(name_or_file: str | Path) -> GridMap:
     """
     text = str(name_or_file)
     if text in map_names():
-        return parse_map((_folder() / f"{text}.txt").read_text(encoding="utf-8"), name=text)
+        return parse_map((_FOLDER / f"{text}.txt").read_text(encoding="utf-8"), name=text)
     path = Path(text)
     try:
-        is_file = path.is_file()
-        if not is_file and (path.suffix or len(path.parts) > 1 or path.exists()):
-            raise MapError(
-                f"There is no map file '{text}'.",
-                "Give the name of a map or the path of a text file.",
-            )
-        if not is_file:
-            raise MapError(
-                f"There is no map '{text}'.",
-                f"{closest(text, map_names())} trdlab gridworld --list shows all.",
-            )
         content = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise MapError(f"The map file '{text}' is not UTF-8 text.", "Save it as UTF-8.") from error
     except (OSError, ValueError) as error:
+        if not path.suffix and len(path.parts) == 1 and isinstance(error, FileNotFoundError):
+            raise MapError(
+                f"There is no map '{text}'.",
+                f"{closest(text, map_names())} trdlab gridworld --list shows all.",
+            ) from error
         reason = getattr(error, "strerror", None) or error
         raise MapError(
-            f"The map file '{text}' cannot be read: {reason}.", "Check the path."
+            f"The map file '{text}' cannot be read: {reason}.",
+            "Give the path of a text file, or the name of a built-in map.",
         ) from error
     return parse_map(content, name=path.stem)
 
@@ -226,10 +219,6 @@ def parse_map(text: str, name: str = "map") -> GridMap:
     grid = replace(grid, rows=tuple(rows))
     _check_wind(grid)
     return grid
-
-
-def _folder() -> "Path":
-    return files(__package__) / "maps"  # type: ignore[return-value]
 
 
 def _split(lines: list[str]) -> tuple[list[str], list[str]]:

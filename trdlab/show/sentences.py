@@ -37,8 +37,8 @@ TEMPLATES: dict[type[Finding], str] = {
     f.Dominates: "Nothing speaks for {worse}: no component is larger than that of {better}.",
     f.Reasons: "To prefer {better} it is enough to look at {components:labels}: "
     "{advantage:value} more there, against {disadvantage:value} for {worse} elsewhere.",
-    f.Flips: "The preference between {action} and {foil} flips where {quantity} is {at:roots} "
-    "(it is {current:plain}; searched from {low:plain} to {high:plain}, policy re-optimised).",
+    f.Flips: "The preference flips where {quantity} is {at:roots} instead of {current:plain} "
+    "(searched from {low:plain} to {high:plain}, policy re-optimised).",
     f.NeverFlips: "No value of {quantity} from {low:plain} to {high:plain} would make {worse} "
     "better than {better} (policy re-optimised).",
     f.EarnsNothing: "{action} earns nothing.",

@@ -1,0 +1,5 @@
+"""`python -m trdlab` is `trdlab`."""
+
+from trdlab.cli import main
+
+main()

@@ -1,0 +1,150 @@
+"""A gridworld as a Gymnasium environment: it samples from the exact model, which it carries."""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from trdlab.errors import InputError, TrdlabError, closest
+from trdlab.gridworld.gridmap import ACTIONS, GridMap, load_map
+from trdlab.gridworld.world import Gridworld
+from trdlab.tabular.mdp import MDP
+
+
+class GridworldEnv(gym.Env[np.int64, np.int64]):
+    """A drone on a map: the observation is the state's index, the action one of four directions.
+
+    What happens is drawn from `mdp`, so whatever is learned here can be compared with the exact
+    answer. An episode ends where the model terminates; it is never truncated from within (see
+    `max_episode_steps` of `gymnasium.make`). `info` has the drone's `row` and `column`, and
+    `collected`, the number of one-time cells it has emptied.
+
+    Args:
+        map: the name of a built-in map, a map file, or a map.
+        slip: the probability of moving sideways instead, in place of the map's own.
+        treasure: what every treasure pays, in place of the map's own value.
+        render_mode: `rgb_array` for pictures, `ansi` for text.
+        cell_pixels: the side of a cell in the pictures.
+
+    Raises:
+        MapError: the map cannot be read or played, or has no treasure to revalue.
+        InputError: an unknown render mode.
+
+    >>> env = GridworldEnv("drone")
+    >>> state, info = env.reset(seed=0)
+    >>> state, reward, terminated, truncated, info = env.step(1)
+    >>> int(state), reward, info
+    (2, 0.0, {'row': 2, 'column': 0, 'collected': 0})
+    """
+
+    metadata = {"render_modes": ["rgb_array", "ansi"], "render_fps": 4}  # noqa: RUF012
+    action_names = ACTIONS
+
+    def __init__(
+        self,
+        map: str | Path | GridMap = "drone",  # noqa: A002
+        *,
+        slip: float | None = None,
+        treasure: float | None = None,
+        render_mode: str | None = None,
+        cell_pixels: int = 64,
+    ) -> None:
+        grid = map if isinstance(map, GridMap) else load_map(map)
+        grid = grid if slip is None else grid.with_slip(slip)
+        grid = grid if treasure is None else grid.with_value("treasure", treasure)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(
+                f"The render mode is '{render_mode}'.",
+                closest(str(render_mode), self.metadata["render_modes"]),
+            )
+        self.world = Gridworld(grid)
+        self.observation_space = gym.spaces.Discrete(self.mdp.num_states)
+        self.action_space = gym.spaces.Discrete(self.mdp.num_actions)
+        self.render_mode = render_mode
+        self.cell_pixels = cell_pixels
+        self._state: int | None = None  # None before the first reset
+        self._terminated = False
+
+    @property
+    def mdp(self) -> MDP:
+        """The exact model that transitions are drawn from."""
+        return self.world.mdp
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.int64, dict[str, Any]]:
+        """Begins an episode at the start, or in `options["state"]`: an index, or `"row,column"`.
+
+        Raises:
+            InputError: there is no such state, or the episode is already over in it.
+        """
+        super().reset(seed=seed)
+        state = self.mdp.start
+        if options is not None and "state" in options:
+            state = self.world.find_state(str(options["state"]))
+            if self.world.is_terminal(state):
+                raise InputError(
+                    f"The episode is over in state {state} ({self.world.states[state]}).",
+                    "Start in a state that is not terminal.",
+                )
+        self._state, self._terminated = state, False
+        return np.int64(state), self._info(state)
+
+    def step(self, action: np.int64 | int) -> tuple[np.int64, float, bool, bool, dict[str, Any]]:
+        """Takes an action: 0 up, 1 down, 2 left, 3 right.
+
+        Raises:
+            InputError: there is no such action.
+            TrdlabError: no episode is running.
+        """
+        if not self.action_space.contains(action):
+            names = ", ".join(f"{i} {name}" for i, name in enumerate(ACTIONS))
+            raise InputError(
+                f"There is no action {action!r}.", f"Actions are whole numbers: {names}."
+            )
+        state = self._running_state()
+        if self._terminated:
+            raise TrdlabError("The episode is over.", "Call reset() before the next step().")
+        drawn = self._draw(state * self.mdp.num_actions + int(action))
+        following = self.mdp.next_states[drawn]
+        self._state, self._terminated = int(following), bool(self.mdp.terminated[drawn])
+        reward = float(self.mdp.rewards[drawn])
+        return following, reward, self._terminated, False, self._info(self._state)
+
+    def render(self) -> Any:
+        """Returns a picture `[H, W, 3]` or a text, as `render_mode` says.
+
+        Raises:
+            TrdlabError: there is nothing to show before the first reset.
+        """
+        if self.render_mode is None:
+            gym.logger.warn(
+                "render() has nothing to return without a render mode. "
+                'Make the environment with render_mode="rgb_array" or "ansi".'
+            )
+            return None
+        state = self._running_state()
+        if self.render_mode == "ansi":
+            from trdlab.gridworld.ansi import ansi
+
+            return ansi(self.world, state)
+        from trdlab.gridworld.render import frame  # here: matplotlib is slow to import
+
+        return frame(self.world, state, self.cell_pixels)
+
+    def _draw(self, row: int) -> int:
+        """Returns one of the transitions of a row of the model, by their probabilities."""
+        first, end = self.mdp.offsets[row], self.mdp.offsets[row + 1]
+        cumulative = np.cumsum(self.mdp.probabilities[first:end])
+        level = self.np_random.random() * cumulative[-1]  # < the last, which may not be quite 1
+        return int(first + np.searchsorted(cumulative, level, side="right"))
+
+    def _running_state(self) -> int:
+        if self._state is None:
+            raise TrdlabError("There is no episode yet.", "Call reset() first.")
+        return self._state
+
+    def _info(self, state: int) -> dict[str, Any]:
+        at = self.world.states[state]
+        return {"row": at.row, "column": at.column, "collected": len(at.collected)}

@@ -28,11 +28,9 @@ def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = Fal
         if path.is_dir():
             raise OutputError(f"'{path}' is a folder.", "Name a file.")
         if path.exists() and not overwrite:
-            raise OutputError(f"The file '{path}' exists.", "Choose another name, or overwrite it.")
+            raise OutputError(f"The file '{path}' exists.", "Choose another name, or --overwrite.")
     except (OSError, ValueError) as error:
-        raise OutputError(
-            f"'{path}' is no usable file name: {error}.", "Choose another."
-        ) from error
+        raise OutputError(f"Cannot write '{path}': {error}.", "Choose another.") from error
     if not os.access(folder, os.W_OK):
         raise OutputError(f"The folder '{folder}' is not writable.", "Choose another one.")
 

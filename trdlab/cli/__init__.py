@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from trdlab.errors import TrdlabError
 
@@ -10,18 +11,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Runs `trdlab`; exits with 0, with 2 for wrong usage or input, or with 1 for a failure."""
     import typer
 
-    from trdlab.cli.app import app, verbose
+    from trdlab.cli.app import app
 
-    usage_error = typer.BadParameter.__bases__[0]  # its class has no public name in all versions
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    usage_error: Any = typer.BadParameter.__base__  # it has no public name in all versions
     try:
-        code = app(arguments, prog_name="trdlab", standalone_mode=False)
+        code = app(words, prog_name="trdlab", standalone_mode=False)
     except TrdlabError as error:
-        if verbose():
+        if {"-v", "--verbose"} & set(words):
             raise
         _fail(f"{error.cause} {error.cure}".strip(), error.exit_code)
     except usage_error as error:
-        path = error.ctx.command_path if error.ctx else "trdlab"  # type: ignore[attr-defined]
-        _fail(f"{error.format_message()} See: {path} --help", 2)  # type: ignore[attr-defined]
+        path = error.ctx.command_path if error.ctx else "trdlab"
+        _fail(f"{error.format_message()} See: {path} --help", 2)
     except typer.Abort:
         _fail("Interrupted.", 130)
     except BrokenPipeError:  # the reader, such as `head`, has seen enough

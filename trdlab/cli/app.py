@@ -1,6 +1,5 @@
 """The `trdlab` command and what all its commands share."""
 
-import sys
 from typing import Annotated
 
 import typer
@@ -18,11 +17,6 @@ app = typer.Typer(
 app.command()(gridworld)
 
 
-def verbose() -> bool:
-    """Returns whether the command line asks for tracebacks."""
-    return bool({"-v", "--verbose"} & set(sys.argv))
-
-
 def _print_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"trdlab {__version__}")
@@ -33,9 +27,7 @@ def _print_version(wanted: bool) -> None:
 def options(
     version: Annotated[
         bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version."
-        ),
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
     """When does an agent expect which reward, and how far can that be trusted?"""

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +12,7 @@ from rich.console import Console
 from trdlab.gridworld import map_names
 
 
-class Ties(str, Enum):
+class Ties(StrEnum):
     """Whose future is told where optimal actions tie."""
 
     LOWEST = "lowest"

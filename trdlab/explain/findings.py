@@ -149,7 +149,7 @@ class FirstStepReward(FirstReward):
 
 @dataclass(frozen=True)
 class Peak(Finding):
-    """The largest explicit component of an action, of several that are not zero."""
+    """The largest explicit component (of equals the first), where several are not zero."""
 
     action: str
     component: int
@@ -160,9 +160,10 @@ class Peak(Finding):
         explicit = row[:-1]
         return (
             i < moment.time_axis.horizon
-            and np.count_nonzero(explicit) > 1
-            and agrees(self.discounted, row[i])
             and bool(explicit[i] > 0.0 and (explicit[i] >= explicit).all())
+            and not (explicit[:i] == explicit[i]).any()
+            and int(np.count_nonzero(explicit)) > 1
+            and agrees(self.discounted, row[i])
         )
 
 
@@ -253,7 +254,7 @@ class SameComponents(Finding):
 
 @dataclass(frozen=True)
 class MoreImmediate(Finding):
-    """One action's running total leads from the first difference on, up to `last_step`."""
+    """One action's running total leads from the first difference on, furthest at `last_step`."""
 
     leader: str
     other: str
@@ -269,11 +270,13 @@ class MoreImmediate(Finding):
         count = self._count(moment)
         if self.last_step != count * axis.width - 1 or not 0 < count <= axis.horizon:
             return False
-        lead = running_lead(moment, self.leader, self.other)[:count]
+        lead = running_lead(moment, self.leader, self.other)[: axis.horizon]
         first = int((lead != 0).argmax())
+        lost = int((lead[first:] <= 0).argmax()) or axis.horizon  # counted from the first lead on
         other = moment.components(self.other)[:count].sum()
         return (
-            bool((lead[first:] > 0).all())
+            bool((lead[first:count] > 0).all())
+            and int(lead[: first + lost].argmax()) == count - 1
             and agrees(self.leader_sum, self._leader_total(moment))
             and agrees(self.other_sum, float(other))
         )
@@ -402,12 +405,11 @@ class Reasons(Finding):
         if not self.components or max(self.components) >= len(delta):
             return False
         chosen, against = delta[list(self.components)], -delta[delta < 0].sum()
-        best_with_one_less = np.sort(delta)[::-1][: len(chosen) - 1].sum()
+        largest = np.argsort(-delta, kind="stable")[: len(chosen)]  # of equals the earlier
         return (
-            len(set(self.components)) == len(self.components)
-            and bool((chosen > 0).all())
-            and chosen.sum() > against > 0
-            and not best_with_one_less > against
+            self.components == tuple(sorted(largest))
+            and bool(chosen.sum() > against > 0)
+            and not delta[largest[:-1]].sum() > against
             and agrees(self.advantage, float(chosen.sum()))
             and agrees(self.disadvantage, float(against))
         )

@@ -92,7 +92,7 @@ class Moment:
 
     def components(self, action: str) -> FloatArray:
         """`[N+1]`: the components of one action."""
-        return self.decomposition.components[self.index(action)]
+        return np.asarray(self.decomposition.components[self.index(action)])
 
     @cached_property
     def q_values(self) -> FloatArray:

@@ -27,6 +27,7 @@ def tabular_moment(
     """
     solution, mdp = table.solution, table.mdp
     here = bool(table.ambiguous[state])
+    tied = zip(action_names, solution.tied[state] & here, strict=True)
     return Moment(
         decomposition=table.decomposition[state],
         action_names=tuple(action_names),
@@ -34,7 +35,7 @@ def tabular_moment(
         policy=solution.policy[state],
         totals=undiscounted_totals(mdp, solution.policy)[state],
         changes_state=tuple(bool(moves) for moves in mdp.leaves_state[state]),
-        tied=tuple(action_names[a] for a in np.flatnonzero(solution.tied[state])) if here else (),
+        tied=tuple(name for name, is_tied in tied if is_tied),
         tied_later=int((table.ambiguous & _later(table, state)).sum()) - here,
         what_ifs=tuple(what_ifs),
     )
@@ -89,7 +90,7 @@ class _Resolved:
         mdp, gamma = self.model(value)
         actions = optimal(mdp, gamma).policy.argmax(1) if self.actions is None else self.actions
         self.actions, q_values = improved(mdp, gamma, actions)
-        return q_values[self.state]
+        return np.asarray(q_values[self.state])
 
 
 def _later(table: ExactTable, state: int) -> BoolArray:

@@ -106,7 +106,8 @@ def page(report: GridworldReport, *, ascii_only: bool = False) -> RenderableType
         report: what is shown.
         ascii_only: for terminals without UTF-8.
     """
-    grid, axis, moment = report.world.grid, report.table.time_axis, report.explanation.moment
+    grid, axis, explanation = report.world.grid, report.table.time_axis, report.explanation
+    moment = explanation.moment
     here = f"state {report.state} ({report.world.states[report.state]})"
     rules = [f"γ = {plain(axis.gamma)}", f"N = {axis.horizon}", f"w = {axis.width}", here]
     rules += [f"slip {plain(grid.slip)}"] * bool(grid.slip)
@@ -130,7 +131,7 @@ def page(report: GridworldReport, *, ascii_only: bool = False) -> RenderableType
             moment, report.explanation.action, report.explanation.foil, ascii_only=ascii_only
         ),
         line(""),
-        story(report.explanation, ascii_only=ascii_only),
+        story(explanation, ascii_only=ascii_only),
         line(""),
         line(check, "green"),
         line(f"Try: {_next_step(report)}", "dim"),
@@ -187,7 +188,7 @@ def _legend(world: Gridworld) -> list[str]:
         cell = grid.legend[symbol]
         if symbol == "S" or cell.kind == "floor":
             continue
-        words = [cell.kind]
+        words: list[str] = [cell.kind]
         if cell.kind not in ("wall", "one-way"):
             words += [f"{amount(cell.value)}"] * bool(cell.value)
             words += ["each time"] * (cell.kind in ("hazard", "fountain") and not cell.terminal)
@@ -204,12 +205,10 @@ def _next_step(report: GridworldReport) -> str:
     world, axis = report.world, report.table.time_axis
     base = f"trdlab gridworld --map {world.grid.name} --gamma {plain(axis.gamma)}"
     if axis.width > 1:
-        return (
-            f"{base} --N {axis.num_steps} --w 1 (the same steps one by one), or --list (all maps)"
-        )
+        return f"{base} --N {axis.num_steps} --w 1 (the same steps one by one)"
     if any(source.kind == "treasure" for source in world.sources):
-        return f"{base} --N {axis.horizon} --treasure 5, or --plot drone.png (a picture)"
-    return f"{base} --N {2 * axis.horizon + 2} (a longer horizon), or --list (all maps)"
+        return f"{base} --N {axis.horizon} --treasure 5 --plot treasure.png"
+    return f"{base} --N {2 * axis.horizon + 2} (a longer horizon)"
 
 
 def _or_none(value: float) -> float | None:

@@ -168,13 +168,18 @@ def _split(text: str) -> list[str]:
 
 
 def _read_value(text: str, _: _Style) -> Shown:
-    decimals = len(text.partition(".")[2])
-    return Shown(text, (lambda x: number(x, decimals)) if decimals else number)
+    decimals = _decimals(text)
+    return Shown(text, lambda x: number(x, decimals))
 
 
 def _read_amount(text: str, _: _Style) -> Shown:
-    decimals = len(text.partition(".")[2])
+    decimals = _decimals(text)
     return Shown(text, lambda x: amount(x, decimals))
+
+
+def _decimals(text: str) -> int:
+    """Returns the decimals in which a number was printed; many, where it took an exponent."""
+    return 9 if "e" in text else len(text.partition(".")[2]) or 2
 
 
 def _read_labels(text: str, style: _Style) -> tuple[int, ...] | None:

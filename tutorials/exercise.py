@@ -1,0 +1,142 @@
+"""The exercises of the lessons: what is right, and what wrong answers usually mean."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+Answer = float | Sequence[float]
+
+_GAMMA = 0.95
+_DOWN = sum(
+    _GAMMA**step for step in (1, 2, 3, 4)
+)  # what four coins in a row are worth
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """A solution, and what to say about other answers.
+
+    Args:
+        right: the solution; numbers agree when they are within half a hundredth.
+        hint: for a wrong answer that is no known mistake.
+        mistakes: wrong answers that show what was misunderstood, each with what to say.
+    """
+
+    right: Answer
+    hint: str
+    mistakes: tuple[tuple[Answer, str], ...] = ()
+
+
+EXERCISES = {
+    "1.1": Exercise(
+        right=1.62 / 0.9**2,
+        hint="Component i was multiplied by γ to the power i.",
+        mistakes=(
+            (
+                1.62,
+                "That is what the reward is worth from here. Undo the discount.",
+            ),
+            (1.62 / 0.9, "You divided by γ once. Two steps away means twice."),
+            (1.62 * 0.9**2, "You discounted it once more. Divide instead."),
+        ),
+    ),
+    "1.2": Exercise(
+        right=[2, 3],
+        hint="Component 0 comes first. It begins with the step taken now, and has w steps.",
+        mistakes=(
+            (
+                [1],
+                "Each component covers w = 2 steps, so the answer has two entries.",
+            ),
+            ([0, 1], "Those are the steps of component 0. We count from 0."),
+            ([1, 2], "Component 0 already covers step 1: it has steps 0 and 1."),
+            (
+                [3, 4],
+                "Component 0 begins with the step taken now, which is step 0.",
+            ),
+        ),
+    ),
+    "1.3": Exercise(
+        right=_DOWN / _GAMMA**4,
+        hint="The treasure, discounted four times, must be worth what down is worth.",
+        mistakes=(
+            (
+                _DOWN,
+                "That is what it must be worth from here. It pays four steps later.",
+            ),
+            (
+                4 + _DOWN - 4 * _GAMMA**4,
+                "The gap is discounted. What closes it must be larger.",
+            ),
+        ),
+    ),
+    "2.1": Exercise(
+        right=[0.5, 0.5, 3],
+        hint="Write r, then 0.5 times each entry of n. That is one too many: add the last two.",
+        mistakes=(
+            (
+                [0.5, 0.5, 1, 2],
+                "Four entries, but N stays the same. Fold the last two.",
+            ),
+            (
+                [0.5, 0.5, 1],
+                "The last entry was dropped. The residual takes it in: 1 + 2.",
+            ),
+            (
+                [0.5, 0.5, 2],
+                "What passes the horizon joins the residual: 0.5·(2 + 4).",
+            ),
+            (
+                [0.5, 1, 6],
+                "The next components are one step further away. Discount them.",
+            ),
+        ),
+    ),
+    "2.2": Exercise(
+        right=7,
+        hint="N · w = 30 with w = 5 gives N. Then count all components.",
+        mistakes=(
+            (
+                6,
+                "Those are the explicit ones. What comes after step 30 needs a place too.",
+            ),
+            (30, "That would be w = 1, and without a residual."),
+            (31, "That would be w = 1. With groups of 5 you need fewer."),
+        ),
+    ),
+    "2.3": Exercise(
+        right=18 / 20,
+        hint="One is discounted once, the other twice. Set them equal, and solve for γ.",
+        mistakes=(
+            (
+                0.95,
+                "That was for 19. The near reward is smaller now: less patience is enough.",
+            ),
+            (20 / 18, "That is above 1. Turn it over."),
+        ),
+    ),
+}
+
+
+def check(name: str, answer: Answer | None) -> None:
+    """Prints whether the answer to an exercise is right; if not, why, as far as can be guessed."""
+    exercise = EXERCISES[name]
+    if answer is None:
+        print(
+            f"Exercise {name}: not answered yet. Replace None, then run this cell again."
+        )
+    elif _same(answer, exercise.right):
+        print(f"Exercise {name}: right.")
+    else:
+        known = (said for wrong, said in exercise.mistakes if _same(answer, wrong))
+        said = next(known, f"Hint: {exercise.hint}")
+        print(f"Exercise {name}: {answer} is not right. {said}")
+
+
+def _same(a: Answer, b: Answer) -> bool:
+    try:
+        left, right = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    except (TypeError, ValueError):
+        return False
+    return left.shape == right.shape and bool(np.all(np.abs(left - right) <= 0.005))

@@ -1,0 +1,182 @@
+"""The machinery of the documentation: lessons become pages, docstrings become Markdown."""
+
+import importlib.util
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+pytest.importorskip("mkdocs")
+from mkdocs.exceptions import PluginError
+
+ROOT = Path(__file__).parents[1]
+
+
+def _load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", ROOT / "docs" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+hooks, docstrings = _load("hooks"), _load("docstrings")
+
+Page = tuple[str, dict[str, bytes]]
+
+
+@pytest.fixture
+def lesson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Page]:
+    """Returns a function that makes the page of a script."""
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    folder = tmp_path / "tutorials"
+    folder.mkdir()
+
+    def page(source: str) -> Any:
+        script = folder / "03_try.py"
+        script.write_text(source, encoding="utf-8")
+        return hooks.lesson_page(script)
+
+    return page
+
+
+def test_cells_are_prose_or_code_and_know_their_line() -> None:
+    source = "import os\n\n# %% [markdown]\n# # Title\n#\n# Text.\n\n# %% a name\n\nx = 1\n\n# %%\n"
+    assert list(hooks.split_cells(source)) == [
+        hooks.Cell("import os", 1, is_prose=False),
+        hooks.Cell("# Title\n\nText.", 4, is_prose=True),
+        hooks.Cell("x = 1", 10, is_prose=False),
+    ]
+
+
+def test_a_script_without_markers_is_one_cell() -> None:
+    assert list(hooks.split_cells("x = 1\n")) == [hooks.Cell("x = 1", 1, is_prose=False)]
+    assert list(hooks.split_cells("")) == []
+
+
+def test_prose_stays_prose_and_output_follows_its_code(lesson: Callable[[str], Page]) -> None:
+    page, pictures = lesson('# %% [markdown]\n# Hello.\n\n# %%\nprint("a  ")\nprint("b")\n')
+    assert page == (
+        'Hello.\n\n```python\nprint("a  ")\nprint("b")\n```\n\n```{.text .output}\na\nb\n```\n'
+    )
+    assert pictures == {}
+
+
+def test_cells_share_their_names(lesson: Callable[[str], Page]) -> None:
+    page, _ = lesson("# %%\nx = 20\n\n# %%\nx + 1\n")
+    assert page.endswith("```python\nx + 1\n```\n\n```{.text .output}\n21\n```\n")
+
+
+def test_a_cell_that_returns_nothing_shows_nothing(lesson: Callable[[str], Page]) -> None:
+    assert lesson("# %%\nx = [1]\n\n# %%\nx.sort()\n")[0].count("```") == 4
+
+
+def test_a_value_with_html_is_shown_as_html(lesson: Callable[[str], Page]) -> None:
+    page, _ = lesson(
+        "# %%\nfrom trdlab.decomposition import *\n\n"
+        "# %%\nRewardDecomposition([1, 2], TimeAxis(0.5, 1))\n"
+    )
+    assert '\n\n<div class="output"><table>' in page
+
+
+@pytest.mark.parametrize(
+    ("cell", "count"),
+    [
+        ("figure, ax = plt.subplots()\n", 1),
+        ("figure, ax = plt.subplots()\nfigure\n", 1),
+        ("plt.figure()\nplt.figure()\n", 2),
+        ("from matplotlib.figure import Figure\nFigure()\n", 1),
+        ("Figure = plt.Figure\n", 0),
+    ],
+)
+def test_figures_become_pictures(lesson: Callable[[str], Page], cell: str, count: int) -> None:
+    source = f"# %%\nfrom matplotlib import pyplot as plt\n\n# %%\n{cell}"
+    page, pictures = lesson(source)
+    assert list(pictures) == [f"03_try-{i + 1}.svg" for i in range(count)]
+    assert all(f"]({name})" in page for name in pictures)
+    assert all(picture.startswith(b"<?xml") for picture in pictures.values())
+    assert lesson(source) == (page, pictures)  # to the byte
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("# %%\nx = 1\n\n# %%\nx = 2\n1 / 0\n", "line 6: ZeroDivisionError: division by zero"),
+        ("# %% [markdown]\n# Hi.\n\n# %%\n\nmissing\n", "line 6: NameError: name 'missing'"),
+        ("# %%\ndef f():\n    raise ValueError('no')\n\n# %%\nf()\n", "line 3: ValueError: no"),
+        ("# %%\nx = 1\n\n# %%\nx = = 2\n", "line 5: SyntaxError"),
+        ("# %%\nint('a')\n", "line 2: ValueError"),
+    ],
+)
+def test_an_error_names_script_and_line(
+    lesson: Callable[[str], Page], source: str, message: str
+) -> None:
+    with pytest.raises(PluginError, match=re.escape(f"tutorials/03_try.py, {message}")):
+        lesson(source)
+
+
+def test_a_failing_lesson_leaves_the_path_as_it_was(lesson: Callable[[str], Page]) -> None:
+    before = list(sys.path)
+    with pytest.raises(PluginError):
+        lesson("# %%\n1 / 0\n")
+    assert sys.path == before
+
+
+def test_examples_become_code_and_errata_rows_links() -> None:
+    prepared = docstrings.prepared(
+        "A sum (errata P1, C5). P2.\n\n>>> f(1)\n2\n>>> f(2)\n\nArgs:\n    x: it."
+    )
+    assert prepared == (
+        "A sum (errata [P1](../errata.md#p1), [C5](../errata.md#c5)). P2.\n\n"
+        "```pycon\n>>> f(1)\n2\n>>> f(2)\n```\n\nArgs:\n    x: it."
+    )
+
+
+def test_each_row_of_the_errata_has_an_anchor_and_says_what_trdlab_does() -> None:
+    page = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
+    rows = [*(f"P{i}" for i in range(1, 14)), *(f"C{i}" for i in range(1, 9))]
+    parts = re.split(r"^### ", page, flags=re.MULTILINE)[1:]
+    assert [part.split(" · ")[0] for part in parts] == rows
+    for row, part in zip(rows, parts, strict=True):
+        assert f"{{ #{row.lower()} }}" in part
+        assert "**There.**" in part
+        assert "**trdlab.**" in part
+
+
+def build(config: Path, site: Path) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", config, "-d", site]
+    return subprocess.run(command, cwd=config.parent, capture_output=True, text=True, check=False)
+
+
+def test_the_site_builds_without_a_warning_and_loads_nothing_from_the_network(
+    tmp_path: Path,
+) -> None:
+    done = build(ROOT / "mkdocs.yml", tmp_path)
+    assert done.returncode == 0, done.stderr
+    pages = list(tmp_path.rglob("*.html"))
+    assert tmp_path / "lessons" / "01_read_a_reward_vector.html" in pages
+    loaded = re.compile(r'<(?:script|img|iframe)[^>]* src="https?:|<link[^>]* href="https?:')
+    for page in pages:
+        assert not loaded.search(page.read_text(encoding="utf-8")), page
+
+
+@pytest.mark.parametrize(("command", "ok"), [("trdlab --help", True), ("trdlab nonsense", False)])
+def test_a_command_that_fails_on_a_page_fails_the_build(
+    tmp_path: Path, command: str, ok: bool
+) -> None:
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "index.md").write_text(f'# T\n\n```bash exec="on"\n{command}\n```\n')
+    (tmp_path / "mkdocs.yml").write_text(
+        f"site_name: T\nplugins: [markdown-exec]\nhooks: ['{ROOT / 'docs' / 'hooks.py'}']\n"
+        "markdown_extensions: [pymdownx.superfences]\n"
+    )
+    done = build(tmp_path / "mkdocs.yml", tmp_path / "site")
+    assert (done.returncode == 0) == ok, done.stderr
+    assert ok or "trdlab nonsense" in done.stderr

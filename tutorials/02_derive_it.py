@@ -309,9 +309,7 @@ for ties in ("lowest", "mixed"):
 # (`table.future.policy`), and where the answer could have been different:
 
 # %%
-print(
-    "states with tied actions of different futures:", np.flatnonzero(tie.ambiguous)
-)
+print("states with tied but different futures:", np.flatnonzero(tie.ambiguous))
 
 # %% [markdown]
 # Q is unique. **A decomposition belongs to a policy.** Whenever somebody shows you a reward vector,

@@ -35,14 +35,14 @@ def number(value: float, decimals: int = 2) -> str:
     """Returns a number as it is printed: an exact zero is `0`, all else has fixed decimals.
 
     >>> number(3.2580), number(0.0), number(-0.001), number(2.5e-9, 4)
-    ('3.26', '0', '0.00', '2.5e-09')
+    ('3.26', '0', '0.00', '2.50e-09')
     """
     if value == 0.0:
         return "0"
     if not math.isfinite(value):
         return "none" if math.isnan(value) else ("-" if value < 0 else "") + "inf"
-    if abs(value) >= _LARGEST_FIXED or (decimals > 2 and abs(value) < 0.1**decimals / 2):
-        return f"{value:.2g}" if abs(value) < 1 else f"{value:.3e}"
+    if abs(value) >= _LARGEST_FIXED or (decimals > 2 and abs(value) < _SMALLEST_FIXED):
+        return f"{value:.2e}"
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 

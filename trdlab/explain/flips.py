@@ -30,6 +30,8 @@ def find_flips(gap: Gap, low: float, high: float, *, samples: int = SAMPLES) -> 
     [-0.5, 0.5]
     """
     known = {float(x): gap(float(x)) for x in np.linspace(low, high, samples + 1)}
+    known |= {x: gap(x) for x in _beside_zeros(known)}
+    known = dict(sorted(known.items()))
     known |= {x: gap(x) for x in _bottoms(gap, known)}
     nonzero = [(x, known[x]) for x in sorted(known) if known[x] != 0.0]
     return tuple(
@@ -39,15 +41,20 @@ def find_flips(gap: Gap, low: float, high: float, *, samples: int = SAMPLES) -> 
     )
 
 
+def _beside_zeros(known: dict[float, float]) -> list[float]:
+    """Returns a point in each interval that begins or ends in a zero: the sign within counts."""
+    return [x + 0.382 * (y - x) for x, y in pairwise(known) if known[x] * known[y] == 0.0]
+
+
 def _bottoms(gap: Gap, known: dict[float, float]) -> list[float]:
     """Returns where |gap| is least, between each three samples of one sign that show a dip."""
     points = list(known)
     found = []
     for x, y, z in zip(points, points[1:], points[2:], strict=False):
         before, here, after = known[x], known[y], known[z]
-        one_sign = before * here > 0.0 and here * after > 0.0
+        one_sign = before * after > 0.0 and before * here >= 0.0
         if one_sign and abs(here) < min(abs(before), abs(after)):
-            found.append(_bottom(gap, x, z, here))
+            found.append(_bottom(gap, x, z, before))
     return found
 
 

@@ -178,8 +178,8 @@ def _read_amount(text: str, _: _Style) -> Shown:
 
 
 def _decimals(text: str) -> int:
-    """Returns the decimals in which a number was printed; many, where it took an exponent."""
-    return 9 if "e" in text else len(text.partition(".")[2]) or 2
+    """Returns the decimals in which a number was printed; any above 2, where it took an exponent."""
+    return 3 if "e" in text else len(text.partition(".")[2]) or 2
 
 
 def _read_labels(text: str, style: _Style) -> tuple[int, ...] | None:

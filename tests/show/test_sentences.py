@@ -1,0 +1,195 @@
+"""No sentence without its numbers: what is printed is read back and tested."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.estimator import Future
+from trdlab.explain.explanation import Explanation, explain
+from trdlab.explain.findings import Finding
+from trdlab.explain.moment import Moment, WhatIf
+from trdlab.explain.tabular import gridworld_moment
+from trdlab.gridworld import Gridworld, load_map, map_names
+from trdlab.show.sentences import TEMPLATES, UnsupportedSentenceError, check, sentences
+from trdlab.tabular import exact
+
+NAMES = ("up", "down", "FIRE", "move left")
+SYMMETRIC = ("promise the same rewards", "are both worth", "tie: their values")
+WORDS = {
+    "more": "fewer",
+    "never": "always",
+    "first": "last",
+    "better": "worse",
+    "largest": "smallest",
+    "Both": "Neither",
+    "Only": "Not only",
+    "overtake": "fall behind",
+    "less": "more",
+    "Nothing": "Everything",
+    "nothing": "much",
+    "equal": "different",
+    "All": "None",
+    "flips": "stays",
+    "No value": "Any value",
+    "not": "too",
+}
+
+
+@st.composite
+def moments(draw: st.DrawFn) -> Moment:
+    """Random moments: repeated, zero and negative components, missing totals, ties, what-ifs."""
+    horizon = draw(st.integers(0, 5))
+    actions = draw(st.integers(2, 4))
+    gamma = draw(st.sampled_from([0.0, 0.3, 0.95, 0.999]))
+    axis = TimeAxis(gamma, horizon, draw(st.sampled_from([1, 1, 2, 5])))
+    size = draw(st.sampled_from([1e-6, 0.01, 1.0, 1.0, 1.0, 1e5]))
+    entry = st.sampled_from([0.0, 0.0, 0.5, 1.0, -1.0]) | st.floats(-3, 3).map(
+        lambda x: round(x, 4)
+    )
+    rows = [[draw(entry) * size for _ in range(horizon + 1)] for _ in range(actions)]
+    if draw(st.booleans()):
+        rows[1] = list(rows[0])
+    decomposition = RewardDecomposition(np.array(rows), axis)
+    total = st.sampled_from([0.0, 4.0, 4.0, 4.001, np.nan])
+    totals = np.array([draw(total) for _ in rows]) if draw(st.booleans()) else None
+    slope = size * draw(st.sampled_from([0.0, 0.1, 1.0, 5.0, -1.0, -5.0]))
+
+    def q_values(value: float) -> np.ndarray:
+        return decomposition.value + slope * (value - 0.95) * np.arange(actions)
+
+    return Moment(
+        decomposition,
+        NAMES[:actions],
+        Future(draw(st.sampled_from(["the optimal policy", "the given policy"]))),
+        totals=totals,
+        tied=draw(st.sampled_from([(), NAMES[:2]])),
+        tied_later=draw(st.integers(0, 2)),
+        what_ifs=(WhatIf("γ", 0.95, 0.01, 0.99, q_values),),
+    )
+
+
+@pytest.fixture(scope="module")
+def of_maps() -> list[Explanation]:
+    axes = (TimeAxis(0.95, 2, 2), TimeAxis(0.95, 4), TimeAxis(0.7, 0), TimeAxis(0.95, 40))
+    result = []
+    for name in map_names():
+        world = Gridworld(load_map(name))
+        for axis in axes:
+            table = exact(world.mdp, axis)
+            states = range(0, world.mdp.num_states, 4) if name != "corridor" else (0,)
+            result += [explain(gridworld_moment(world, table, state)) for state in states]
+    return result
+
+
+def test_every_sentence_about_every_map_is_supported(of_maps: list[Explanation]):
+    for explanation in of_maps:
+        claims = check(" ".join(sentences(explanation)), explanation)
+        assert [type(c) for c in claims] == [type(x) for x in explanation.findings]
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(moments())
+def test_every_sentence_about_any_moment_is_supported(moment: Moment):
+    explanation = explain(moment, *moment.action_names[:2])
+    assert all(finding.holds(moment) for finding in explanation.findings)
+    claims = check(" ".join(sentences(explanation)), explanation)
+    assert [type(c) for c in claims] == [type(x) for x in explanation.findings]
+
+
+def test_every_kind_of_finding_occurs_and_has_a_sentence(of_maps: list[Explanation]):
+    seen: set[type[Finding]] = {type(x) for e in of_maps for x in e.findings}
+
+    @settings(max_examples=400, deadline=None, derandomize=True)
+    @given(moments())
+    def collect(moment: Moment) -> None:
+        seen.update(map(type, explain(moment, *moment.action_names[:2]).findings))
+
+    collect()
+    assert set(TEMPLATES) == set(Finding.kinds.values()), "each kind has a sentence"
+    assert seen == set(TEMPLATES), f"never found: {set(TEMPLATES) - seen}"
+
+
+def mutated_numbers(sentence: str) -> list[str]:
+    """Returns the sentence with each of its numbers changed in its last digit, up and down."""
+    result = []
+    for match in re.finditer(r"\d+(?:\.\d+)?", sentence):
+        text = match[0]
+        for step in (1, -1):
+            digits = int(text.replace(".", "")) + step
+            if digits < 0:
+                continue
+            decimals = len(text.partition(".")[2])
+            other = f"{digits / 10**decimals:.{decimals}f}"
+            if other != text:
+                result.append(sentence[: match.start()] + other + sentence[match.end() :])
+    return result
+
+
+def mutated_names(sentence: str, names: tuple[str, ...]) -> list[str]:
+    """Returns the sentence with the actions exchanged, and with one that does not exist."""
+    a, b = names[:2]
+    pattern = re.compile(rf"\b(?:{a}|{b})\b", re.IGNORECASE)
+    if not pattern.search(sentence):
+        return []
+    result = [pattern.sub("sideways", sentence, count=1)]
+    both = {name.lower() for name in pattern.findall(sentence)} == {a, b}
+    if both and not any(words in sentence for words in SYMMETRIC):
+        other = {a: b, b: a}
+        swapped = pattern.sub(lambda m: other[m[0].lower()], sentence)
+        result.append(swapped[0].upper() + swapped[1:])
+    return result
+
+
+def mutated_words(sentence: str) -> list[str]:
+    return [
+        re.sub(rf"\b{old}\b", new, sentence, count=1)
+        for old, new in WORDS.items()
+        if re.search(rf"\b{old}\b", sentence)
+    ]
+
+
+def mutations(explanation: Explanation) -> list[str]:
+    names = explanation.moment.action_names
+    return [
+        mutant
+        for text in sentences(explanation)
+        for mutant in [*mutated_numbers(text), *mutated_names(text, names), *mutated_words(text)]
+    ]
+
+
+def survivors(explanation: Explanation) -> list[str]:
+    survived = []
+    for mutant in mutations(explanation):
+        try:
+            check(mutant, explanation)
+        except UnsupportedSentenceError:
+            continue
+        survived.append(mutant)
+    return survived
+
+
+def test_a_mutated_number_name_or_claim_about_a_map_fails(of_maps: list[Explanation]):
+    assert sum(len(mutations(explanation)) for explanation in of_maps) > 2_000
+    assert [mutant for explanation in of_maps for mutant in survivors(explanation)] == []
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(moments())
+def test_a_mutated_number_name_or_claim_about_any_moment_fails(moment: Moment):
+    assert survivors(explain(moment, *moment.action_names[:2])) == []
+
+
+def test_a_sentence_of_no_known_kind_fails(of_maps: list[Explanation]):
+    explanation = of_maps[0]
+    with pytest.raises(UnsupportedSentenceError, match="no statement about"):
+        check("Down is clearly the wise choice.", explanation)
+
+
+def test_a_wrong_number_is_named(of_maps: list[Explanation]):
+    explanation = of_maps[0]
+    with pytest.raises(UnsupportedSentenceError, match=r"pay 5 in total\.' is not true"):
+        check("Both routes pay 5 in total.", explanation)

@@ -25,7 +25,7 @@ unit: $(VENV)/installed-tests
 	$(BIN)/pytest -n 2
 
 docs: $(VENV)/installed-tests
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/startup.py

@@ -1,8 +1,31 @@
 """trdlab: when does an agent expect which reward, and how far can that be trusted?"""
 
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from trdlab.decomposition import RewardDecomposition, TimeAxis
+    from trdlab.estimator import Estimator, Future
 
 __version__ = "0.1.0"
+__all__ = ["Estimator", "Future", "RewardDecomposition", "TimeAxis", "__version__"]
+
+_HOMES = {
+    "RewardDecomposition": "trdlab.decomposition",
+    "TimeAxis": "trdlab.decomposition",
+    "Estimator": "trdlab.estimator",
+    "Future": "trdlab.estimator",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Imports the nouns when they are first asked for, so that `import trdlab` costs nothing."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'trdlab' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(_HOMES[name]), name)
+
 
 # Whoever has imported Gymnasium will want to `make` our maps; nobody else should pay for it.
 if "gymnasium" in sys.modules:

@@ -121,7 +121,9 @@ class AllBeyond(Finding):
 
 @dataclass(frozen=True)
 class FirstReward(Finding):
-    """The first component of an action that is not zero."""
+    """The first component of an action that is not zero, where it is positive."""
+
+    sign: ClassVar[float] = 1.0
 
     action: str
     component: int
@@ -129,8 +131,15 @@ class FirstReward(Finding):
 
     def holds(self, moment: Moment) -> bool:
         row, i = moment.components(self.action), self.component
-        explicit = i < moment.time_axis.horizon
-        return explicit and not row[:i].any() and row[i] != 0.0 and agrees(self.discounted, row[i])
+        is_first = i < moment.time_axis.horizon and not row[:i].any()
+        return is_first and bool(row[i] * self.sign > 0.0) and agrees(self.discounted, row[i])
+
+
+@dataclass(frozen=True)
+class FirstCost(FirstReward):
+    """The same where that component is negative."""
+
+    sign: ClassVar[float] = -1.0
 
 
 @dataclass(frozen=True)
@@ -145,6 +154,13 @@ class FirstStepReward(FirstReward):
             return False
         true = moment.components(self.action)[self.component] / axis.gamma**self.component
         return agrees(self.reward, float(true))
+
+
+@dataclass(frozen=True)
+class FirstStepCost(FirstStepReward):
+    """The same where that reward is negative."""
+
+    sign: ClassVar[float] = -1.0
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,9 @@ from trdlab.explain.findings import (
     CentreOfMass,
     EarnsNothing,
     Finding,
+    FirstCost,
     FirstReward,
+    FirstStepCost,
     FirstStepReward,
     Peak,
     ShareBeyond,
@@ -42,9 +44,10 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
     findings: list[Finding] = []
     if axis.width == 1 and axis.gamma > 0.0:
         reward = discounted / axis.gamma**first
-        findings.append(FirstStepReward(action, first, discounted, reward))
+        kind = FirstStepReward if discounted > 0.0 else FirstStepCost
+        findings.append(kind(action, first, discounted, reward))
     else:
-        findings.append(FirstReward(action, first, discounted))
+        findings.append((FirstReward if discounted > 0.0 else FirstCost)(action, first, discounted))
     if np.count_nonzero(explicit) > 1:
         peak = int(explicit.argmax())
         if explicit[peak] > 0.0:

@@ -10,6 +10,7 @@ from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
 
 GAMMA_RANGE = (0.01, 0.99)
+MAX_WHAT_IF_STATES = 2_000  # each quantity takes a hundred solves
 REWARD_RANGE = 10.0
 """How many times its present value a source of reward is varied up to, from zero on."""
 
@@ -44,13 +45,15 @@ def tabular_moment(
 def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
     """Returns what a solved gridworld expects in one state; under the optimal policy also what-ifs.
 
+    These are γ and every source of reward, in models of up to `MAX_WHAT_IF_STATES` states.
+
     Args:
         world: the gridworld.
         table: its exact decomposition.
         state: the index of the state.
     """
     what_ifs: list[WhatIf] = []
-    if table.solution.is_optimal:
+    if table.solution.is_optimal and world.mdp.num_states <= MAX_WHAT_IF_STATES:
         gamma, mdp = table.time_axis.gamma, world.mdp
         solver = _Resolved(state, lambda value: (mdp, value))
         low, high = min(GAMMA_RANGE[0], gamma), max(GAMMA_RANGE[1], gamma)

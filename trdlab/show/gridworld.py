@@ -1,6 +1,7 @@
 """A solved gridworld, explained: one page of text, or one JSON object."""
 
 import math
+import shlex
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from rich.text import Text
 
 from trdlab.decomposition import TimeAxis
 from trdlab.explain.explanation import Explanation, explain
-from trdlab.explain.tabular import gridworld_moment
+from trdlab.explain.tabular import MAX_WHAT_IF_STATES, gridworld_moment
 from trdlab.formatting import amount, plain
 from trdlab.gridworld import Gridworld, load_map, map_names
 from trdlab.gridworld.ansi import DRONE, ansi
@@ -22,16 +23,29 @@ from trdlab.show.text import action_table, fit, story
 from trdlab.tabular import ExactTable, Ties, exact
 
 SCHEMA = "trdlab.gridworld/1"
+_UNSEARCHED = (
+    "What would flip the preference was not searched: "
+    f"this map has over {MAX_WHAT_IF_STATES} states."
+)
 
 
 @dataclass(frozen=True)
 class GridworldReport:
-    """A gridworld, its exact table, one of its states, and the explanation of that state."""
+    """A gridworld, its exact table, one of its states, and the explanation of that state.
+
+    Args:
+        world: the gridworld.
+        table: its exact decomposition.
+        state: the index of the explained state.
+        explanation: what was found about it.
+        map_name: what the map was loaded from, a name or a file.
+    """
 
     world: Gridworld
     table: ExactTable
     state: int
     explanation: Explanation
+    map_name: str
 
     @property
     def sum_error(self) -> float:
@@ -82,7 +96,7 @@ def report(
     index = world.find_state(state)
     table = exact(world.mdp, axis, ties=ties)
     moment = gridworld_moment(world, table, index)
-    return GridworldReport(world, table, index, explain(moment, action, foil))
+    return GridworldReport(world, table, index, explain(moment, action, foil), map_name)
 
 
 def map_list(*, ascii_only: bool = False) -> RenderableType:
@@ -132,6 +146,7 @@ def page(report: GridworldReport, *, ascii_only: bool = False) -> RenderableType
         ),
         line(""),
         story(explanation, ascii_only=ascii_only),
+        *([line(_UNSEARCHED, "dim")] if explanation.foil and not moment.what_ifs else []),
         line(""),
         line(check, "green"),
         line(f"Try: {_next_step(report)}", "dim"),
@@ -203,7 +218,7 @@ def _legend(world: Gridworld) -> list[str]:
 def _next_step(report: GridworldReport) -> str:
     """Returns a command that shows something new about this very map."""
     world, axis = report.world, report.table.time_axis
-    base = f"trdlab gridworld --map {world.grid.name} --gamma {plain(axis.gamma)}"
+    base = f"trdlab gridworld --map {shlex.quote(report.map_name)} --gamma {plain(axis.gamma)}"
     if axis.width > 1:
         return f"{base} --N {axis.num_steps} --w 1 (the same steps one by one)"
     if any(source.kind == "treasure" for source in world.sources):

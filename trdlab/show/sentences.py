@@ -47,6 +47,10 @@ TEMPLATES: dict[type[Finding], str] = {
     "{reward:amount}, worth {discounted:value} now.",
     f.FirstReward: "The first reward after {action} comes at {component:label}, worth "
     "{discounted:value} now.",
+    f.FirstStepCost: "{action} first costs something at {component:label}: {reward:amount}, worth "
+    "{discounted:value} now.",
+    f.FirstCost: "{action} first costs something at {component:label}, worth "
+    "{discounted:value} now.",
     f.Peak: "The largest expected reward of {action} comes at {component:label}: "
     "{discounted:value}.",
     f.CentreOfMass: "The rewards of {action} before the residual centre on t+{step:value}.",
@@ -178,7 +182,7 @@ def _read_amount(text: str, _: _Style) -> Shown:
 
 
 def _decimals(text: str) -> int:
-    """Returns the decimals in which a number was printed; any above 2, where it took an exponent."""
+    """Returns the decimals of a printed number; any above 2, where it took an exponent."""
     return 3 if "e" in text else len(text.partition(".")[2]) or 2
 
 

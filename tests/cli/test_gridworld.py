@@ -1,0 +1,211 @@
+"""`trdlab gridworld` as its users see it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from trdlab import __version__
+from trdlab.cli import main
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+def in_shell(*words: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    command = [sys.executable, "-m", "trdlab", *words]
+    return subprocess.run(command, capture_output=True, env=os.environ | environment, check=False)
+
+
+def test_the_papers_numbers(capsys: pytest.CaptureFixture[str]):
+    code, out, err = run(capsys, "gridworld", "--gamma", "0.95", "--N", "2", "--w", "2")
+    rows = {line.split()[0]: line for line in reversed(out.splitlines()) if line.strip()}
+    assert (code, err) == (0, "")
+    assert "[0, 0, 3.26]" in rows["up"]
+    assert "[0.95, 1.76, 0.81]" in rows["down"]
+    assert "3.52" in rows["down"]
+    assert "Both routes pay 4 in total." in out
+    assert "Down gives more immediate rewards" in out
+    assert "the optimal policy" in out
+
+
+def test_the_papers_numbers_step_by_step(capsys: pytest.CaptureFixture[str]):
+    _, out, _ = run(capsys, "gridworld", "--gamma", "0.95", "--N", "4", "--w", "1")
+    assert "[0, 0.95, 0.90, 0.86, 0.81]" in out
+    assert "[0, 0, 0, 0, 3.26]" in out
+
+
+def test_json_has_full_precision_and_nothing_else_is_on_stdout(capsys: pytest.CaptureFixture[str]):
+    code, out, _ = run(capsys, "gridworld", "--N", "4", "--json")
+    data = json.loads(out)
+    actions = data["actions"]
+    assert code == 0
+    assert data["schema"] == "trdlab.gridworld/1"
+    assert actions["up"]["components"][-1] == pytest.approx(4 * 0.95**4, abs=1e-12)
+    for action in actions.values():
+        assert sum(action["components"]) == pytest.approx(action["q_value"], abs=1e-12)
+    kinds = {finding["kind"] for finding in data["findings"]}
+    assert {"equal-totals", "more-immediate", "never-flips", "whose-future"} <= kinds
+    assert all(finding["sentence"].endswith(".") for finding in data["findings"])
+
+
+def test_json_has_null_where_no_total_exists(capsys: pytest.CaptureFixture[str]):
+    _, out, _ = run(capsys, "gridworld", "--map", "loop", "--json")
+    assert json.loads(out)["actions"]["right"]["undiscounted_total"] is None
+
+
+def test_options_change_the_world(capsys: pytest.CaptureFixture[str]):
+    _, out, _ = run(capsys, "gridworld", "--treasure", "5", "--action", "up", "--foil", "left")
+    assert "Up against left" in out
+    assert "0.86888" not in out  # that is where up and down change places
+    _, out, _ = run(capsys, "gridworld", "--treasure", "5")
+    assert "The preference flips where γ is 0.86888 instead of 0.95" in " ".join(out.split())
+    _, slippery, _ = run(capsys, "gridworld", "--slip", "0.2", "--json")
+    assert json.loads(slippery)["map"]["slip"] == 0.2
+
+
+def test_states_are_named_by_number_or_place(capsys: pytest.CaptureFixture[str]):
+    _, by_number, _ = run(capsys, "gridworld", "--state", "1", "--json")
+    _, by_place, _ = run(capsys, "gridworld", "--state", "0,0", "--json")
+    assert by_number == by_place
+
+
+def test_ties_are_said_and_can_be_mixed(capsys: pytest.CaptureFixture[str]):
+    _, out, _ = run(capsys, "gridworld", "--map", "tie")
+    assert "Here left and right tie" in out
+    assert "of tied actions the first" in " ".join(out.split())
+    _, out, _ = run(capsys, "gridworld", "--map", "tie", "--ties", "mixed")
+    assert "mixes tied actions evenly" in " ".join(out.split())
+    assert "chosen 50 %" in out
+
+
+def test_a_map_file(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    path = tmp_path / "mine.txt"
+    path.write_text("title: Mine\n---\n>C\nS#\n>C", encoding="utf-8")
+    code, out, _ = run(capsys, "gridworld", "--map", str(path))
+    assert code == 0
+    assert out.startswith("mine · Mine")
+    assert "Up and down promise the same rewards at the same times." in out
+    assert f"Try: trdlab gridworld --map {path}" in "".join(out.split("\n"))
+
+
+def test_list_shows_every_map(capsys: pytest.CaptureFixture[str]):
+    _, out, _ = run(capsys, "gridworld", "--list")
+    for name in ("drone", "patience", "bridge", "tie", "corridor", "loop", "windy"):
+        assert f"\n{name}" in out
+
+
+def test_version(capsys: pytest.CaptureFixture[str]):
+    assert run(capsys, "--version") == (0, f"trdlab {__version__}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--gamma", "1"], "The discount factor gamma is 1.0. It must be at least 0 and less than"),
+        (["--gamma", "nan"], "The discount factor gamma is nan."),
+        (["--gamma", "high"], "Invalid value for '--gamma': "),
+        (["--N", "-1"], "The horizon N is -1. It must be a whole number of at least 0."),
+        (["--w", "0"], "The width w is 0. It must be a whole number of at least 1."),
+        (["--map", "dron"], "There is no map 'dron'. Did you mean 'drone'?"),
+        (["--map", "no/such.txt"], "The map file 'no/such.txt' cannot be read: No such file"),
+        (["--map", "."], "The map file '.' cannot be read: Is a directory."),
+        (["--state", "99"], "There is no state 99. States run from 0 to 13."),
+        (["--state", "1,3"], "The drone can never be at row 1, column 3."),
+        (["--action", "dwon"], "There is no action 'dwon'. Did you mean 'down'?"),
+        (["--action", "up", "--foil", "up"], "Action and foil are both 'up'."),
+        (["--slip", "2"], "The slip probability is 2.0. It must lie between 0 and 1."),
+        (["--treasure", "inf"], "The value of treasure is 'inf'. It must be a finite number."),
+        (["--map", "loop", "--treasure", "3"], "The map 'loop' has no treasure."),
+        (["--plot", "no/such/folder.png"], "The folder 'no/such' does not exist. Create it first."),
+        (["--plot", "x.pgn"], "'.pgn' is no known ending. Did you mean '.png'?"),
+        (["--N", "100000000"], "N = 100000000 takes"),
+        (["--gama", "0.9"], "No such option"),
+        (["extra"], "unexpected extra argument"),
+    ],
+)
+def test_bad_input_is_one_line_with_its_cure(
+    capsys: pytest.CaptureFixture[str], words: list[str], message: str
+):
+    code, out, err = run(capsys, "gridworld", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    assert message in err
+
+
+def test_verbose_shows_the_traceback():
+    shown = in_shell("gridworld", "--gamma", "2", "-v")
+    assert b"Traceback" in shown.stderr
+    assert shown.returncode != 0
+    assert b"Traceback" not in in_shell("gridworld", "--gamma", "2").stderr
+
+
+def test_pictures_are_written_once(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    for suffix, start in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
+        path = tmp_path / f"drone{suffix}"
+        code, _, err = run(capsys, "gridworld", "--plot", str(path))
+        assert (code, err) == (0, f"Picture: {path}\n")
+        assert path.read_bytes().startswith(start)
+    before = path.read_bytes()
+    code, out, err = run(capsys, "gridworld", "--plot", str(path))
+    assert (code, out) == (2, "")
+    assert "exists" in err
+    assert path.read_bytes() == before
+    assert run(capsys, "gridworld", "--plot", str(path), "--overwrite")[0] == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["drone.pdf", "drone.png", "drone.svg"]
+
+
+@pytest.mark.parametrize("columns", ["40", "80", "120"])
+def test_no_colour_and_no_overflow_in_pipes(columns: str):
+    shown = in_shell("gridworld", "--N", "2", "--w", "2", COLUMNS=columns)
+    text = shown.stdout.decode()
+    assert "\x1b" not in text
+    assert max(map(len, text.splitlines())) <= int(columns)
+
+
+def test_colour_can_be_refused():
+    assert (
+        b"\x1b[32m"
+        in in_shell("gridworld", FORCE_COLOR="1", NO_COLOR="", TERM="xterm-256color").stdout
+    )
+    refused = in_shell("gridworld", FORCE_COLOR="1", NO_COLOR="1", TERM="xterm-256color")
+    assert b"\x1b[32m" not in refused.stdout
+
+
+def test_a_terminal_without_utf8():
+    shown = in_shell("gridworld", "--N", "2", "--w", "2", PYTHONIOENCODING="ascii")
+    text = shown.stdout.decode("ascii")
+    assert shown.returncode == 0
+    assert "t..t+1, t+2..t+3, t+4..inf" in text
+    assert "gamma = 0.95" in text
+    assert in_shell("gridworld", "--list", PYTHONIOENCODING="ascii").returncode == 0
+    assert in_shell("gridworld", "--help", PYTHONIOENCODING="ascii").returncode == 0
+    wrong = in_shell("gridworld", "--map", "dröne", PYTHONIOENCODING="ascii")
+    assert wrong.returncode == 2
+    assert b"Traceback" not in wrong.stderr
+
+
+def test_nothing_heavy_is_imported():
+    code = (
+        "import sys, trdlab, trdlab.cli; assert 'torch' not in sys.modules\n"
+        "try: trdlab.cli.main(['gridworld'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'torch', 'pygame', 'gymnasium', 'matplotlib', 'scipy'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+def test_a_reader_that_stops_early_is_no_failure():
+    command = f"{sys.executable} -m trdlab gridworld --N 400 | head -n 1"
+    shown = subprocess.run(command, shell=True, capture_output=True, check=True)
+    assert shown.stdout.startswith(b"drone")
+    assert shown.stderr == b""

@@ -1,15 +1,18 @@
 """A finite Markov decision process, stored as the list of its transitions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.errors import InputError
+
+_Item = TypeVar("_Item")
+_Table = Sequence[_Item] | Mapping[int, _Item]  # by number: a list, or a dict as Gymnasium has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +33,7 @@ class MDP:
 
     Raises:
         InputError: a row is empty or does not sum to 1, a probability is negative, a number is
-            not finite, or a state does not exist.
+            not finite, a state does not exist, or the arrays do not fit together.
     """
 
     offsets: IntArray
@@ -42,6 +45,19 @@ class MDP:
     start: int = 0
 
     def __post_init__(self) -> None:
+        arrays = (self.next_states, self.probabilities, self.rewards, self.terminated)
+        ends = self.offsets[[0, -1]].tolist()
+        if self.num_actions < 1 or (len(self.offsets) - 1) % self.num_actions:
+            raise InputError(
+                f"{len(self.offsets) - 1} rows do not divide among {self.num_actions} actions.",
+                "Give every state the same actions.",
+            )
+        if any(array.shape != (ends[1],) for array in arrays) or ends[0] != 0:
+            raise InputError(
+                f"The offsets run from {ends[0]} to {ends[1]}, the arrays have shapes "
+                f"{', '.join(str(array.shape) for array in arrays)}.",
+                "Give one entry per transition.",
+            )
         if not np.isfinite(self.rewards).all() or not np.isfinite(self.probabilities).all():
             raise InputError("A reward or probability is not a finite number.", "Check the model.")
         if np.any(np.diff(self.offsets) <= 0):
@@ -72,7 +88,7 @@ class MDP:
     @classmethod
     def from_transitions(
         cls,
-        transitions: Sequence[Sequence[Sequence[tuple[float, int, float, bool]]]],
+        transitions: "_Table[_Table[Sequence[tuple[float, int, float, bool]]]]",
         start: int = 0,
     ) -> "MDP":
         """Builds a model from `transitions[s][a]`, a list of (probability, s′, reward, terminated).
@@ -83,10 +99,18 @@ class MDP:
         >>> coin.num_states, coin.num_actions, coin.expected_rewards.tolist()
         (1, 2, [[1.0, 0.0]])
         """
-        rows = [row for actions in transitions for row in actions]
+        states = [transitions[s] for s in range(len(transitions))]
+        rows = [actions[a] for actions in states for a in range(len(actions))]
         flat = [transition for row in rows for transition in row]
         if not flat:
             raise InputError("The model has no transition.", "Give each state and action one.")
+        uneven = [s for s, actions in enumerate(states) if len(actions) != len(states[0])]
+        if uneven:
+            raise InputError(
+                f"State {uneven[0]} has {len(states[uneven[0]])} actions, state 0 has "
+                f"{len(states[0])}.",
+                "Give every state the same actions.",
+            )
         probabilities, next_states, rewards, terminated = zip(*flat, strict=True)
         return cls(
             offsets=np.cumsum([0, *map(len, rows)]),
@@ -94,7 +118,7 @@ class MDP:
             probabilities=np.array(probabilities, dtype=np.float64),
             rewards=np.array(rewards, dtype=np.float64),
             terminated=np.array(terminated, dtype=np.bool_),
-            num_actions=len(transitions[0]),
+            num_actions=len(states[0]),
             start=start,
         )
 

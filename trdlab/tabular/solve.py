@@ -1,18 +1,21 @@
 """Exact values: the optimal ones and those of a given policy, each with a proven error bound."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
-from trdlab.errors import TrdlabError
+from trdlab.errors import InputError, TrdlabError
 from trdlab.tabular.mdp import MDP, as_policy
 
 Ties = Literal["lowest", "mixed"]
 
 _UNIT = float(np.finfo(np.float64).eps)
+_UNDERFLOW = float(np.finfo(np.float64).tiny)  # above what underflowing operations lose together
+_LARGEST_VALUE = 1e290  # leaves room for the bounds
+_LONGEST = 1e12  # expected steps, beyond which rounding decides an undiscounted total
 _DENSE_STATES = 500  # up to here a dense solve is done before scipy could be imported
 _QUICK_GAIN = 1e-13  # relative
 _MAX_SWEEPS = 2_000
@@ -27,10 +30,11 @@ class Solution:
         gamma: the discount factor they were solved for.
         policy: `[S, A]`, the action probabilities whose future it is.
         q_values: `[S, A]`.
-        error_bound: `[S, A]`, proven: no Q-value is further than this from the exact one.
+        error_bound: `[S, A]`, proven: no Q-value is further than this from the exact one of its
+            policy, and for an optimal policy from the exact optimal one.
         tied: `[S, A]`, the optimal actions of each state where several cannot be told apart
-            within twice the bound. All false where the best action is unique, in terminal
-            states, and for a given policy.
+            within twice the bound of their evaluation. All false where the best action is
+            unique, in terminal states, and for a given policy.
         is_optimal: whether the policy was solved for, not given.
     """
 
@@ -59,22 +63,19 @@ def optimal(mdp: MDP, gamma: float, *, ties: Ties = "lowest") -> Solution:
         ties: how to choose among tied optimal actions.
 
     Raises:
-        InputError: γ is outside [0, 1).
+        InputError: γ is outside [0, 1), or the values are out of reach of double precision.
     """
-    TimeAxis(gamma, 0)
+    _check(mdp, gamma)
     actions, _ = improved(mdp, gamma, _greedy_after_sweeps(mdp, gamma))
-    solution = _surely_improved(mdp, gamma, actions)
-    bound = _optimality_bound(solution)
-    near = solution.q_values + bound >= (solution.q_values - bound).max(axis=1, keepdims=True)
+    best = _surely_improved(mdp, gamma, actions)
+    most, least = best.q_values + best.error_bound, best.q_values - best.error_bound
+    near = most >= least.max(axis=1, keepdims=True)
     policy = near / near.sum(axis=1, keepdims=True) if ties == "mixed" else _lowest(near)
-    if not np.array_equal(policy, solution.policy):
-        solution = _evaluated(mdp, gamma, policy)
+    chosen = _chosen_without_loss(mdp, best, policy)
     several = (near.sum(axis=1) > 1) & ~mdp.terminal_states
-    return Solution(
-        gamma=gamma,
-        policy=policy,
-        q_values=solution.q_values,
-        error_bound=np.maximum(bound, solution.error_bound),
+    return replace(
+        chosen,
+        error_bound=_optimality_bound(chosen),
         tied=near & several[:, None],
         is_optimal=True,
     )
@@ -84,9 +85,10 @@ def evaluate(mdp: MDP, policy: FloatArray, gamma: float) -> Solution:
     """Solves for the values of a given stochastic policy `[S, A]`.
 
     Raises:
-        InputError: γ is outside [0, 1), or a row of `policy` is no distribution.
+        InputError: γ is outside [0, 1), a row of `policy` is no distribution, or the values are
+            out of reach of double precision.
     """
-    TimeAxis(gamma, 0)
+    _check(mdp, gamma)
     return _evaluated(mdp, gamma, as_policy(policy, mdp))
 
 
@@ -95,20 +97,27 @@ def undiscounted_totals(mdp: MDP, policy: FloatArray) -> FloatArray:
 
     It is the total of the given policy, as that was chosen under γ < 1 (errata P9). A total
     exists where the policy, with probability 1, ends the episode or comes to where it is no
-    longer paid.
+    longer paid. Where that is 10¹² steps away or more, rounding would decide: NaN as well.
     """
     weights = _transition_weights(mdp, as_policy(policy, mdp))
     rewards = mdp.per_state(weights * mdp.rewards)
     edge = (weights > 0.0) & ~mdp.terminated
     sources, targets = mdp.transition_states[edge], mdp.next_states[edge]
     terminates = mdp.per_state(weights * mdp.terminated) > 0.0
-    paid = _can_reach(rewards != 0.0, sources, targets)
+    pays = mdp.per_state(weights * np.abs(mdp.rewards)) > 0.0  # even if it is 0 on average
+    paid = _can_reach(pays, sources, targets)
     comes_to_an_end = _can_reach(terminates | ~paid, sources, targets)
     endless = _can_reach(~comes_to_an_end, sources, targets)
     values = np.where(endless, np.nan, 0.0)
     active = paid & ~endless
     if active.any():
-        values[active] = _solve_chain(mdp, weights * ~mdp.terminated, rewards, active)
+        chain = weights * ~mdp.terminated
+        try:
+            steps = _solve_chain(mdp, chain, np.ones(mdp.num_states), active)
+            totals = _solve_chain(mdp, chain, rewards, active)
+            values[active] = np.where((steps >= 0.99) & (steps < _LONGEST), totals, np.nan)
+        except InputError:
+            values[active] = np.nan
     follows = np.where(mdp.continuation > 0.0, mdp.continuation * values[mdp.next_states], 0.0)
     return mdp.expected_rewards + mdp.per_action(follows)
 
@@ -174,6 +183,24 @@ def _surely_improved(mdp: MDP, gamma: float, actions: IntArray) -> Solution:
     )
 
 
+def _chosen_without_loss(mdp: MDP, best: Solution, policy: FloatArray) -> Solution:
+    """Evaluates the choice among tied actions, undone in states where it proves to lose.
+
+    Close to γ = 1 an action can be too little worse than the best to be told apart, and yet cost
+    much when it is taken again and again.
+    """
+    best_values = best.state_values
+    best_bound = (best.policy * best.error_bound).sum(axis=1)
+    while not np.array_equal(policy, best.policy):
+        chosen = _evaluated(mdp, best.gamma, policy)
+        bound = best_bound + (policy * chosen.error_bound).sum(axis=1)
+        loses = (chosen.state_values + bound < best_values) & (policy != best.policy).any(axis=1)
+        if not loses.any():
+            return chosen
+        policy = np.where(loses[:, None], best.policy, policy)
+    return best
+
+
 def _gains(solution: Solution, *, pessimistic: bool) -> FloatArray:
     """Returns `[S, A]`: the least (or most) that an action can be better than the policy's."""
     own = (solution.policy * solution.q_values).sum(axis=1, keepdims=True)
@@ -187,16 +214,18 @@ def _optimality_bound(solution: Solution) -> FloatArray:
     If no other action can be better, the policy is optimal and only its evaluation errs. What
     cannot be excluded, a gain of η a step, adds up to η / (1 − γ) at the most.
     """
-    others = np.where(solution.policy > 0.0, 0.0, _gains(solution, pessimistic=False))
+    others = np.where(solution.policy == 1.0, 0.0, _gains(solution, pessimistic=False))
     unexcluded = max(float(others.max()), 0.0)
-    return solution.error_bound + unexcluded / (1.0 - solution.gamma)
+    return solution.error_bound + 1.01 * unexcluded / (1.0 - solution.gamma)
 
 
 def _evaluated(mdp: MDP, gamma: float, policy: FloatArray) -> Solution:
     """Evaluates a policy; the bound is a forward error analysis, state by state.
 
     The computed v misses its own equation v = r + γCv by a residual that is known up to
-    rounding; its error is that residual carried along the chain, (I − γC)⁻¹·|residual|.
+    rounding; its error is that residual carried along the chain, (I − γC)⁻¹·|residual|. That in
+    turn is computed, enlarged, and checked: y ≥ (I − γC)⁻¹·x holds wherever y − γCy ≥ x does,
+    and where x is missed by σ, adding 1.01·σ / (1 − γ) makes up for it.
     """
     weights = _transition_weights(mdp, policy)
     chain = gamma * weights * ~mdp.terminated
@@ -207,8 +236,11 @@ def _evaluated(mdp: MDP, gamma: float, policy: FloatArray) -> Solution:
     size = mdp.per_state(np.abs(weights * mdp.rewards) + chain * np.abs(next_values)) + np.abs(
         values
     )
-    residual = np.abs(rewards + mdp.per_state(chain * next_values) - values) + rounding * size
+    residual = np.abs(rewards + mdp.per_state(chain * next_values) - values)
+    residual += rounding * size + _UNDERFLOW
     carried = 1.01 * np.abs(_solve_chain(mdp, chain, residual))
+    proven = carried - mdp.per_state(chain * carried[mdp.next_states]) - 2 * rounding * carried
+    carried += 1.01 * max(float((residual - proven).max()), 0.0) / (1.0 - gamma)
     size_of_q = mdp.per_action(np.abs(mdp.probabilities * mdp.rewards)) + gamma * mdp.expect(
         np.abs(values)
     )
@@ -216,9 +248,27 @@ def _evaluated(mdp: MDP, gamma: float, policy: FloatArray) -> Solution:
         gamma=gamma,
         policy=policy,
         q_values=mdp.expected_rewards + gamma * mdp.expect(values),
-        error_bound=gamma * mdp.expect(carried) + rounding * size_of_q,
+        error_bound=gamma * mdp.expect(carried) + rounding * size_of_q + _UNDERFLOW,
         tied=np.zeros((mdp.num_states, mdp.num_actions), dtype=np.bool_),
     )
+
+
+def _check(mdp: MDP, gamma: float) -> None:
+    TimeAxis(gamma, 0)
+    inexact = float(mdp.per_action(mdp.probabilities).max()) - 1.0
+    inexact += _UNIT if np.any(mdp.probabilities % 1.0) else 0.0
+    if inexact > 0.005 * (1.0 - gamma):
+        raise InputError(
+            f"gamma = {gamma!r} is too close to 1 for a model whose probabilities sum to 1 only "
+            f"within {inexact:.1g}.",
+            "Choose a smaller gamma.",
+        )
+    largest = float(np.abs(mdp.rewards).max())
+    if largest > _LARGEST_VALUE * (1.0 - gamma):
+        raise InputError(
+            f"Rewards of {largest:.3g} at gamma = {gamma!r} can add up beyond double precision.",
+            "Give smaller rewards.",
+        )
 
 
 def _transition_weights(mdp: MDP, policy: FloatArray) -> FloatArray:
@@ -232,19 +282,23 @@ def _solve_chain(
     """Solves x = right + chain·x, for all states or for those in `among` with 0 outside."""
     size, keep = mdp.num_states, chain != 0.0
     sources, targets, weights = mdp.transition_states[keep], mdp.next_states[keep], chain[keep]
-    if size <= _DENSE_STATES:
-        matrix = np.bincount(sources * size + targets, weights, size * size).reshape(size, size)
-        system = np.eye(size) - matrix
-        if among is not None:
+    among = np.ones(size, dtype=np.bool_) if among is None else among
+    try:
+        if size <= _DENSE_STATES:
+            matrix = np.bincount(sources * size + targets, weights, size * size)
+            system = np.eye(size) - matrix.reshape(size, size)
             return np.linalg.solve(system[np.ix_(among, among)], right[among])
-        return np.linalg.solve(system, right)
-    from scipy.sparse import csc_array, eye_array
-    from scipy.sparse.linalg import spsolve
+        from scipy.sparse import csc_array, eye_array
+        from scipy.sparse.linalg import splu
 
-    sparse = eye_array(size, format="csc") - csc_array((weights, (sources, targets)), (size, size))
-    if among is not None:
-        return np.asarray(spsolve(sparse[among][:, among], right[among]))
-    return np.asarray(spsolve(sparse, right))
+        entries = csc_array((weights, (sources, targets)), (size, size))
+        sparse = (eye_array(size, format="csc") - entries)[among][:, among]
+        return np.asarray(splu(sparse.tocsc()).solve(right[among]))
+    except (np.linalg.LinAlgError, RuntimeError) as error:  # the system is singular
+        raise InputError(
+            "The values are out of reach of double precision: the future is all but endless.",
+            "Choose a smaller gamma.",
+        ) from error
 
 
 def _can_reach(goal: BoolArray, sources: IntArray, targets: IntArray) -> BoolArray:

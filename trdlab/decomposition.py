@@ -1,8 +1,9 @@
 """The nouns: the time axis, and the reward decomposition that lives on it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 SCHEMA = "trdlab.RewardDecomposition/1"
+_MOST_ROWS = 50  # as a table; what is longer is shown by its shape
 
 
 @dataclass(frozen=True)
@@ -43,16 +45,19 @@ class TimeAxis:
     width: int = 1
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.gamma < 1.0:
+        gamma: Any = self.gamma
+        if not isinstance(gamma, Real) or not 0.0 <= float(gamma) < 1.0:
             raise InputError(
-                f"The discount factor gamma is {self.gamma}.",
+                f"The discount factor gamma is {gamma}.",
                 "It must be at least 0 and less than 1, for example 0.95.",
             )
-        for name, value, least in (("horizon N", self.horizon, 0), ("width w", self.width, 1)):
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-                raise InputError(
-                    f"The {name} is {value}.", f"It must be a whole number of at least {least}."
-                )
+        plain = {  # whatever numpy type they came in
+            "gamma": float(gamma),
+            "horizon": _whole("horizon N", self.horizon, 0),
+            "width": _whole("width w", self.width, 1),
+        }
+        for name, value in plain.items():
+            object.__setattr__(self, name, value)
 
     @property
     def num_components(self) -> int:
@@ -103,7 +108,8 @@ class TimeAxis:
         Raises:
             InputError: `width` is no multiple of the present width, or does not divide N·w.
         """
-        if not isinstance(width, int) or width < 1 or width % self.width:
+        width = _whole("width w", width, 1)
+        if width % self.width:
             raise InputError(
                 f"Groups of {self.width} cannot be regrouped to a width of {width}.",
                 f"Choose a multiple of {self.width}.",
@@ -114,7 +120,8 @@ class TimeAxis:
             raise InputError(
                 f"{self.num_steps} steps do not divide into groups of {width}: "
                 f"the last group would be short.",
-                f"Choose a width from {fits}, or a horizon that is a multiple of {width}.",
+                f"Choose a width from {fits}, or a horizon N that is a multiple of "
+                f"{width // math.gcd(width, self.width)}.",
             )
         return TimeAxis(self.gamma, self.num_steps // width, width)
 
@@ -124,6 +131,14 @@ class TimeAxis:
                 f"There is no component {component}.", f"Components run from 0 to {self.horizon}."
             )
         return component
+
+
+def _whole(name: str, value: Any, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(
+            f"The {name} is {value!r}.", f"It must be a whole number of at least {least}."
+        )
+    return int(value)
 
 
 def step_label(offset: int) -> str:
@@ -190,6 +205,9 @@ class RewardDecomposition:
             raise TypeError("a single vector of components has no length; see time_axis")
         return self.shape[0]
 
+    def __iter__(self) -> Iterator["RewardDecomposition"]:
+        return (self[i] for i in range(len(self)))  # so that a single vector refuses
+
     def __getitem__(self, index: Any) -> "RewardDecomposition":
         """Selects states, actions or moments; the component axis stays whole."""
         parts = index if isinstance(index, tuple) else (index,)
@@ -225,7 +243,8 @@ class RewardDecomposition:
         [0.95, 1.76, 0.81]
         """
         axis = self.time_axis.regrouped(width)
-        groups = self.components[..., :-1].reshape(*self.shape, axis.horizon, -1).sum(axis=-1)
+        split = (*self.shape, axis.horizon, width // self.time_axis.width)
+        groups = self.components[..., :-1].reshape(split).sum(axis=-1)
         return RewardDecomposition(
             np.concatenate([groups, self.components[..., -1:]], axis=-1), axis
         )
@@ -245,7 +264,7 @@ class RewardDecomposition:
                 "the steps inside it carry different discounts.",
                 "Decompose with w = 1, or ask for undiscounted_bounds.",
             )
-        self._refuse_gamma_zero()
+        self._refuse_vanishing_discounts()
         return np.asarray(self.components[..., :-1] / self.time_axis.discounts[:-1])
 
     def undiscounted_bounds(
@@ -254,22 +273,27 @@ class RewardDecomposition:
         """Returns `[..., N+1]` twice: the least and the most undiscounted reward per component.
 
         They follow from the range of a single reward alone: the sum of a group is least when it
-        is paid as early as possible, and most when as late. A range of one sign is enough
-        (`0, inf` or `-inf, 0`); the residual then has one finite bound.
+        is paid as early as possible, and most when as late. The residual has a finite bound only
+        where rewards have one sign (`0, inf` or `-inf, 0`, or within).
 
         Args:
-            lowest: the least reward that a single step can pay.
+            lowest: the least reward that a single step can pay. After the end of an episode
+                steps pay 0: where an end is possible, the range must include 0.
             highest: the most that it can pay.
 
         Raises:
-            InputError: the range bounds nothing (both ends infinite), contradicts the
-                components, or γ = 0.
+            InputError: the range bounds nothing (both ends infinite) or is empty, it contradicts
+                the components, or γ = 0.
 
         >>> group = RewardDecomposition([0.95, 0.81], TimeAxis(0.95, horizon=1, width=2))
         >>> [bound.round(2).tolist() for bound in group.undiscounted_bounds()]
         [[0.95, 0.9], [1.0, inf]]
         """
-        self._refuse_gamma_zero()
+        self._refuse_vanishing_discounts()
+        if not lowest <= highest or lowest == math.inf or highest == -math.inf:
+            raise InputError(
+                f"There is no reward from {lowest} to {highest}.", "Give the lower end first."
+            )
         if math.isinf(lowest) and math.isinf(highest):
             raise InputError(
                 "Rewards of both signs without a limit bound nothing.",
@@ -279,25 +303,24 @@ class RewardDecomposition:
             mirrored = RewardDecomposition(-self.components, self.time_axis)
             low, high = mirrored.undiscounted_bounds(-highest, math.inf)
             return -high, -low
-        weights = self.time_axis.gamma ** np.arange(self.time_axis.width)  # [w]
+        gamma, width = self.time_axis.gamma, self.time_axis.width
+        weights = gamma ** np.arange(width)  # [w]
         own_start = self.components / self.time_axis.discounts  # [..., N+1], from each own start
-        excess = own_start[..., :-1] - lowest * weights.sum()  # [..., N], above the least there is
-        capacity = (highest - lowest) * weights.sum()
-        if np.any(excess < -1e-9) or np.any(excess > capacity + 1e-9):
-            raise InputError(
-                f"No rewards from {lowest} to {highest} add up to these components.",
-                "Widen the range of a single reward.",
-            )
-        floor = lowest * self.time_axis.width
-        low = floor + _filled(excess, weights, highest - lowest)
-        high = floor + _filled(excess, weights[::-1], highest - lowest)
+        totals = np.full(self.time_axis.num_components, weights.sum())
+        totals[-1] = 1.0 / (1.0 - gamma)  # of the endless weights of the residual
+        _check_range(own_start, lowest * totals, highest * totals)
+        excess = own_start[..., :-1] - lowest * totals[:-1]  # [..., N], above the least there is
+        low = lowest * width + _filled(excess, weights, highest - lowest)
+        high = lowest * width + _filled(excess, weights[::-1], highest - lowest)
         tail = own_start[..., -1:]
-        one_sign = lowest >= 0.0
-        tail_low = tail if one_sign else np.full_like(tail, -np.inf)
-        tail_high = np.where(tail == 0.0, 0.0, np.inf) if one_sign else np.full_like(tail, np.inf)
+        low_tail, high_tail = np.full_like(tail, -np.inf), np.full_like(tail, np.inf)
+        if lowest >= 0.0:
+            low_tail, high_tail = tail, np.where(tail == 0.0, 0.0, np.inf)
+        elif highest <= 0.0:
+            low_tail, high_tail = np.where(tail == 0.0, 0.0, -np.inf), tail
         return (
-            np.concatenate([low, tail_low], axis=-1),
-            np.concatenate([high, tail_high], axis=-1),
+            np.concatenate([low, low_tail], axis=-1),
+            np.concatenate([high, high_tail], axis=-1),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -316,7 +339,7 @@ class RewardDecomposition:
         """Returns the decomposition that `to_dict` wrote.
 
         Raises:
-            InputError: another schema, or a field is missing.
+            InputError: another schema, or a field is missing or holds something else.
         """
         if data.get("schema") != SCHEMA:
             raise InputError(
@@ -327,11 +350,17 @@ class RewardDecomposition:
             return cls(np.asarray(data["components"], dtype=np.float64), axis)
         except KeyError as error:
             raise InputError(f"The field {error} is missing.", "Write it with to_dict.") from error
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(
+                f"The components are no array of numbers: {error}.", "Write them with to_dict."
+            ) from error
 
     def __rich__(self) -> "Table | str":
         from rich.table import Table
 
-        if len(self.shape) > 1:
+        if not self._is_readable():
             return repr(self)
         table = Table(*self.time_axis.labels, "value", title=_axis_text(self.time_axis))
         for column in table.columns:
@@ -341,7 +370,7 @@ class RewardDecomposition:
         return table
 
     def _repr_html_(self) -> str:
-        if len(self.shape) > 1:
+        if not self._is_readable():
             return f"<code>{repr(self).replace('<', '&lt;')}</code>"
         head = "".join(f"<th>{label}</th>" for label in (*self.time_axis.labels, "value"))
         body = "".join(
@@ -352,21 +381,43 @@ class RewardDecomposition:
         return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
     def __repr__(self) -> str:
-        if len(self.shape) > 1 or self.time_axis.horizon > 12:
+        if not self._is_readable() or self.time_axis.horizon > 12:
             return f"RewardDecomposition(shape={self.components.shape}, {self.time_axis})"
         return f"RewardDecomposition({self.components.tolist()}, {self.time_axis})"
+
+    def _is_readable(self) -> bool:
+        return len(self.shape) < 2 and math.prod(self.shape) <= _MOST_ROWS
 
     def _text_rows(self) -> list[list[str]]:
         rows = np.atleast_2d(np.concatenate([self.components, self.value[..., None]], axis=-1))
         decimals = decimals_for(rows.ravel())
         return [[number(v, decimals) for v in row] for row in rows]
 
-    def _refuse_gamma_zero(self) -> None:
-        if self.time_axis.gamma == 0.0:
+    def _refuse_vanishing_discounts(self) -> None:
+        axis = self.time_axis
+        if axis.gamma == 0.0:
             raise InputError(
                 "With gamma = 0 later rewards are worth nothing and cannot be read back.",
                 "Decompose with gamma above 0.",
             )
+        if axis.gamma**axis.num_steps < np.finfo(np.float64).tiny:
+            raise InputError(
+                f"{axis.gamma:g} to the power of {axis.num_steps} vanishes in double precision: "
+                "later rewards cannot be read back.",
+                "Choose a smaller horizon N.",
+            )
+
+
+def _check_range(sums: FloatArray, least: FloatArray, most: FloatArray) -> None:
+    """Refuses sums outside their range by more than rounding (that of their own precision)."""
+    ends = [np.where(np.isfinite(end), np.abs(end), 0.0) for end in (least, most)]
+    scale = np.maximum(np.maximum(*ends), np.abs(sums))
+    slack = max(1e-9, 32 * float(np.finfo(sums.dtype).eps)) * np.maximum(1.0, scale)
+    if np.any(sums < least - slack) or np.any(sums > most + slack):
+        raise InputError(
+            "Rewards in this range cannot add up to these components.",
+            "Widen the range of a single reward.",
+        )
 
 
 def _filled(excess: FloatArray, weights: FloatArray, room: float) -> FloatArray:

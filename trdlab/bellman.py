@@ -27,7 +27,8 @@ def target(reward: Array, discount: Array, next_components: Array) -> Array:
         `[..., N+1]`, of the kind (numpy, torch) of `next_components`.
 
     Raises:
-        InputError: `next_components` has no component axis, or the shapes do not fit.
+        InputError: `next_components` has no component axis or holds no floating-point numbers,
+            or the shapes do not fit.
 
     Source: the paper's Eq. trd-loss, corrected (errata P1, P2, P4).
 
@@ -36,9 +37,14 @@ def target(reward: Array, discount: Array, next_components: Array) -> Array:
     array([1., 1., 5.])
     """
     xp = array_namespace(next_components)
-    if next_components.ndim == 0:
+    if next_components.ndim == 0 or next_components.shape[-1] == 0:
         raise InputError(
-            "next_components has no component axis.", "Give an array of shape [..., N+1]."
+            f"next_components has shape {tuple(next_components.shape)}: it has no component.",
+            "Give an array of shape [..., N+1].",
+        )
+    if not xp.isdtype(next_components.dtype, "real floating"):  # r and d would be cut to integers
+        raise InputError(
+            f"next_components has type {next_components.dtype}.", "Give floating-point numbers."
         )
     options = {"dtype": next_components.dtype, "device": getattr(next_components, "device", None)}
     reward, discount = xp.asarray(reward, **options), xp.asarray(discount, **options)

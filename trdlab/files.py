@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from pathlib import Path
 
 from trdlab.errors import OutputError, closest
@@ -23,14 +24,16 @@ def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = Fal
         raise OutputError(f"Cannot write '{path}': '{path.suffix}' is no known ending.", near)
     folder = path.parent
     try:
-        if not folder.is_dir():
-            raise OutputError(f"The folder '{folder}' does not exist.", "Create it first.")
-        if path.is_dir():
-            raise OutputError(f"'{path}' is a folder.", "Name a file.")
-        if path.exists() and not overwrite:
-            raise OutputError(f"The file '{path}' exists.", "Choose another name, or --overwrite.")
+        has_folder, is_folder, exists = folder.is_dir(), path.is_dir(), path.exists()
     except (OSError, ValueError) as error:
-        raise OutputError(f"Cannot write '{path}': {error}.", "Choose another.") from error
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"Cannot write '{path}': {reason}.", "Choose another name.") from error
+    if not has_folder:
+        raise OutputError(f"The folder '{folder}' does not exist.", "Create it first.")
+    if is_folder:
+        raise OutputError(f"'{path}' is a folder.", "Name a file.")
+    if exists and not overwrite:
+        raise OutputError(f"The file '{path}' exists.", "Choose another name, or --overwrite.")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"The folder '{folder}' is not writable.", "Choose another one.")
 
@@ -45,7 +48,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     Raises:
         OutputError: the disk is full, or the file cannot be written for another reason.
     """
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    temporary = path.with_name(f".{path.stem[:40]}.{os.getpid()}{path.suffix}")  # names have limits
     try:
         write(temporary)
         temporary.replace(path)
@@ -53,4 +56,5 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         reason = error.strerror or error
         raise OutputError(f"Cannot write '{path}': {reason}.", "Choose another place.") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # gone already, or never there
+            temporary.unlink()

@@ -12,8 +12,9 @@ Kind = Literal["floor", "wall", "one-way", "coin", "treasure", "hazard", "founta
 ACTIONS = ("up", "down", "left", "right")
 MOVES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 MAX_CELLS = 10_000
-_FOLDER = Path(__file__).parent / "maps"
 MAX_WIND = 9
+_MAX_CHARACTERS = 100_000
+_FOLDER = Path(__file__).parent / "maps"
 
 _DEFAULT_VALUES = {"coin": 1.0, "treasure": 4.0, "hazard": -1.0, "fountain": 1.0, "exit": 0.0}
 
@@ -155,7 +156,8 @@ def load_map(name_or_file: str | Path) -> GridMap:
         return parse_map((_FOLDER / f"{text}.txt").read_text(encoding="utf-8"), name=text)
     path = Path(text)
     try:
-        content = path.read_text(encoding="utf-8-sig")
+        with path.open(encoding="utf-8-sig") as file:
+            content = file.read(_MAX_CHARACTERS + 1)
     except UnicodeDecodeError as error:
         raise MapError(f"The map file '{text}' is not UTF-8 text.", "Save it as UTF-8.") from error
     except (OSError, ValueError) as error:
@@ -169,6 +171,11 @@ def load_map(name_or_file: str | Path) -> GridMap:
             f"The map file '{text}' cannot be read: {reason}.",
             "Give the path of a text file, or the name of a built-in map.",
         ) from error
+    if len(content) > _MAX_CHARACTERS:
+        raise MapError(
+            f"The map file '{text}' has more than {_MAX_CHARACTERS} characters.",
+            f"A map may have {MAX_CELLS} cells.",
+        )
     return parse_map(content, name=path.stem)
 
 
@@ -235,11 +242,14 @@ def _trimmed(lines: list[str]) -> list[str]:
 
 def _with_header(grid: GridMap, lines: list[str]) -> GridMap:
     legend, seen = dict(grid.legend), set()
-    for line in filter(None, lines):
+    for line in filter(None, map(str.strip, lines)):
         if line[1:].lstrip().startswith("="):
-            symbol, meaning = line[0], line.split("=", 1)[1].split()
+            symbol, meaning = line[0], line[1:].lstrip()[1:].split()
             if symbol in LEGEND and LEGEND[symbol].kind in ("floor", "wall", "one-way"):
                 raise MapError(f"The symbol '{symbol}' has a fixed meaning.", "Choose another one.")
+            if symbol in seen:
+                raise MapError(f"The header defines '{symbol}' twice.", "Keep one of the lines.")
+            seen.add(symbol)
             legend[symbol] = _parse_cell(symbol, meaning)
             continue
         key, colon, value = (part.strip() for part in line.partition(":"))
@@ -281,7 +291,7 @@ def _parse_wind(text: str) -> Wind:
     direction, *strengths = text.split() or [""]
     if direction not in ACTIONS:
         raise MapError(f"The wind blows '{direction}'.", closest(direction, ACTIONS))
-    if not all(s.isascii() and s.isdigit() and int(s) <= MAX_WIND for s in strengths):
+    if not all(s.isascii() and s.isdigit() and int(s[:9]) <= MAX_WIND for s in strengths):
         raise MapError(
             f"Cannot read the wind strengths '{' '.join(strengths)}'.",
             f"Write a whole number from 0 to {MAX_WIND} for each column (or row).",

@@ -68,7 +68,7 @@ class Gridworld:
     >>> from trdlab.gridworld.gridmap import load_map
     >>> world = Gridworld(load_map("drone"))
     >>> str(world.states[0]), world.mdp.num_states
-    ('row 1, column 0', 18)
+    ('row 1, column 0', 14)
     """
 
     action_names = ACTIONS
@@ -78,6 +78,7 @@ class Gridworld:
         self.sources = _sources(grid)
         self.states: list[State] = [State(*grid.start)]
         self._index = {self.states[0]: 0}
+        self._entered: set[Place] = {grid.start}  # at rest, or in passing
         self._outcomes: list[
             dict[_Outcome, float]
         ] = []  # row s·A + a: the probability of each outcome
@@ -99,7 +100,17 @@ class Gridworld:
         )
 
     def mdp_if(self, source: Source, value: float) -> MDP:
-        """Returns the model in which one source of reward pays another value."""
+        """Returns the model in which one source of reward pays another value.
+
+        Raises:
+            InputError: this world has no such source, or the value is not finite.
+        """
+        if source not in self.sources:
+            raise InputError(
+                f"No {source.kind} pays {source.value:g} here.", "Name one of the sources."
+            )
+        if not np.isfinite(value):
+            raise InputError(f"The value of the {source.kind} is {value}.", "Give a finite one.")
         values = [value if other == source else other.value for other in self.sources]
         return self.mdp.with_rewards(self._earned @ np.array(values))
 
@@ -202,6 +213,7 @@ class Gridworld:
             earned[self.sources.index(Source("step", -self.grid.step_cost))] += 1
         terminated = False
         for place in path:
+            self._entered.add(place)
             cell = self.grid.cell(*place)
             if place not in collected and _pays(cell):
                 earned[self.sources.index(Source(cell.kind, cell.value))] += 1
@@ -217,18 +229,17 @@ class Gridworld:
         return _Outcome(self._index[following], tuple(earned), terminated)
 
     def _check_reachable(self) -> None:
-        reached = {state.place for state in self.states}
         for row, line in enumerate(self.grid.rows):
             for column, symbol in enumerate(line):
                 cell = self.grid.legend[symbol]
                 wanted = cell.kind in ("coin", "treasure", "fountain", "exit")
-                if wanted and (row, column) not in reached:
+                if wanted and (row, column) not in self._entered:
                     raise MapError(
                         f"The {cell.kind} at row {row}, column {column} of the map "
                         f"'{self.grid.name}' cannot be reached from the start.",
                         "Open a way to it, or remove it.",
                     )
-        if reached == {self.grid.start}:
+        if self._entered == {self.grid.start}:
             raise MapError(
                 f"The start of the map '{self.grid.name}' is walled in.", "Open a way out of it."
             )

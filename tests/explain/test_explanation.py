@@ -8,15 +8,22 @@ import pytest
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import findings as f
-from trdlab.explain.explanation import Explanation, explain
+from trdlab.explain import contrast, flips, forecast
+from trdlab.explain.explanation import (
+    Explanation,
+    TiedActions,
+    TiedLater,
+    WhoseFuture,
+    explain,
+)
+from trdlab.explain.finding import Finding
 from trdlab.explain.moment import Moment
 from trdlab.explain.tabular import gridworld_moment
 from trdlab.gridworld import Gridworld, load_map, parse_map
 from trdlab.tabular import exact
 
 GAMMA = 0.95
-F = TypeVar("F", bound=f.Finding)
+F = TypeVar("F", bound=Finding)
 
 
 def explained(
@@ -40,19 +47,19 @@ def found(kind: type[F], explanation: Explanation) -> list[F]:
 def test_the_drone_prefers_down_because_it_pays_sooner():
     explanation = explained()
     assert (explanation.action, explanation.foil) == ("down", "up")
-    (totals,) = found(f.EqualTotals, explanation)
+    (totals,) = found(contrast.EqualTotals, explanation)
     assert totals.total == pytest.approx(4.0)
-    (sooner,) = found(f.MoreImmediate, explanation)
+    (sooner,) = found(contrast.MoreImmediate, explanation)
     assert (sooner.leader, sooner.other, sooner.last_step) == ("down", "up", 3)
     assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
-    (better,) = found(f.BetterByDiscount, explanation)
+    (better,) = found(contrast.BetterByDiscount, explanation)
     assert better.better_value == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4)
     assert better.worse_value == pytest.approx(4 * GAMMA**4)
-    assert found(f.StaysAhead, explanation) == [f.StaysAhead("down", "up")]
+    assert found(contrast.StaysAhead, explanation) == [contrast.StaysAhead("down", "up")]
 
 
 def test_the_fewest_components_that_justify_down_are_its_three_coins():
-    (reasons,) = found(f.Reasons, explained())
+    (reasons,) = found(contrast.Reasons, explained())
     # against them stand 3 γ⁴ of the treasure; two coins are not enough
     assert reasons.components == (1, 2, 3)
     assert reasons.advantage == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
@@ -61,9 +68,9 @@ def test_the_fewest_components_that_justify_down_are_its_three_coins():
 
 
 def test_treasure_4_never_flips_over_gamma_and_treasure_5_flips_once():
-    assert found(f.NeverFlips, explained())[0].quantity == "γ"
+    assert found(flips.NeverFlips, explained())[0].quantity == "γ"
     richer = Gridworld(load_map("drone").with_value("treasure", 5))
-    (flip,) = (x for x in found(f.Flips, explained(richer)) if x.quantity == "γ")
+    (flip,) = (x for x in found(flips.Flips, explained(richer)) if x.quantity == "γ")
     # 1 + γ + γ² = 4 γ³
     (root,) = flip.at
     assert root == pytest.approx(0.86888, abs=5e-6)
@@ -71,17 +78,17 @@ def test_treasure_4_never_flips_over_gamma_and_treasure_5_flips_once():
 
 
 def test_the_treasure_and_the_coins_that_flip_the_preference():
-    flips = {x.quantity: x.at for x in found(f.Flips, explained())}
+    at = {x.quantity: x.at for x in found(flips.Flips, explained())}
     treasure = 1 + GAMMA**-1 + GAMMA**-2 + GAMMA**-3
     assert treasure == pytest.approx(4.3270, abs=5e-5)
-    assert flips["the reward for the treasure"] == pytest.approx((treasure,), abs=1e-9)
-    assert flips["the reward for each coin"] == pytest.approx((4 / treasure,), abs=1e-9)
+    assert at["the reward for the treasure"] == pytest.approx((treasure,), abs=1e-9)
+    assert at["the reward for each coin"] == pytest.approx((4 / treasure,), abs=1e-9)
 
 
 def test_flips_re_optimise_the_policy():
     # staying on the near branch is better at low γ; the far branch needs a policy of its own
     world = Gridworld(load_map("patience"))
-    (flip,) = (x for x in found(f.Flips, explained(world)) if x.quantity == "γ")
+    (flip,) = (x for x in found(flips.Flips, explained(world)) if x.quantity == "γ")
     assert flip.at == pytest.approx(((1 / 3) ** (1 / 9),), abs=1e-10)  # 3 γ⁹ = 1
 
 
@@ -91,7 +98,7 @@ def test_a_given_policy_has_no_what_ifs_and_is_named():
     table = exact(world.mdp, TimeAxis(GAMMA, 2), policy=uniform)
     explanation = explain(gridworld_moment(world, table, 0), "down", "up")
     assert explanation.flips == ()
-    assert explanation.context == (f.WhoseFuture("the given policy"),)
+    assert explanation.context == (WhoseFuture("the given policy"),)
 
 
 def test_contrasts_never_default_to_an_action_that_stays():
@@ -112,36 +119,36 @@ def test_a_corridor_has_no_foil():
 def test_ties_are_carried_and_said():
     tie = Gridworld(load_map("tie"))
     explanation = explained(tie)
-    assert explanation.context[1:] == (f.TiedActions(("left", "right")),)
-    assert explanation.context[0] == f.WhoseFuture("the optimal policy (of tied actions the first)")
+    assert explanation.context[1:] == (TiedActions(("left", "right")),)
+    assert explanation.context[0] == WhoseFuture("the optimal policy (of tied actions the first)")
     mixed = explained(tie, ties="mixed")
-    assert "mixes tied actions evenly" in found(f.WhoseFuture, mixed)[0].policy
+    assert "mixes tied actions evenly" in found(WhoseFuture, mixed)[0].policy
     before = Gridworld(
         parse_map("X = coin 19 terminal\nY = treasure 20 terminal\n---\n##S##\nX...Y#"[:-1])
     )
-    assert found(f.TiedLater, explained(before)) == []  # the routes from below S are as long
+    assert found(TiedLater, explained(before)) == []  # the routes from below S are as long
 
 
 def test_ties_in_later_states_are_counted():
     world = Gridworld(parse_map("X = coin 19 terminal\nY = coin 20 terminal\n---\n##S###\nX....Y"))
     explanation = explained(world, axis=TimeAxis(GAMMA, 8))
-    assert found(f.TiedLater, explanation) == [f.TiedLater(1)]
+    assert found(TiedLater, explanation) == [TiedLater(1)]
 
 
 def test_a_loop_has_no_total():
     explanation = explained(Gridworld(load_map("loop")))
     assert np.isnan(explanation.moment.total("right"))
     world = Gridworld(parse_map("f.S.f"))
-    assert {x.action for x in found(f.NoTotal, explained(world))} == {"left", "right"}
+    assert {x.action for x in found(contrast.NoTotal, explained(world))} == {"left", "right"}
 
 
 def test_forecast_of_an_explicit_step_gives_the_reward_itself():
     explanation = explained()
-    (first,) = found(f.FirstStepReward, explanation)
+    (first,) = found(forecast.FirstStepReward, explanation)
     assert (first.component, first.reward) == (1, pytest.approx(1.0))
-    (share,) = found(f.ShareBeyond, explanation)
+    (share,) = found(forecast.ShareBeyond, explanation)
     assert share.share == pytest.approx(GAMMA**4 / (GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4))
-    (centre,) = found(f.CentreOfMass, explanation)
+    (centre,) = found(forecast.CentreOfMass, explanation)
     assert centre.step == pytest.approx(
         (GAMMA + 2 * GAMMA**2 + 3 * GAMMA**3) / (GAMMA + GAMMA**2 + GAMMA**3)
     )
@@ -149,27 +156,29 @@ def test_forecast_of_an_explicit_step_gives_the_reward_itself():
 
 def test_what_is_not_defined_is_not_said():
     mixed_signs = explain(moment([[1.0, -1.0, 0.5], [0.0, 0.0, 0.2]]), "a", "b")
-    assert not found(f.ShareBeyond, mixed_signs)
-    assert not found(f.CentreOfMass, mixed_signs)
+    assert not found(forecast.ShareBeyond, mixed_signs)
+    assert not found(forecast.CentreOfMass, mixed_signs)
     grouped = explain(moment([[1.0, 2.0, 0.5], [0.0, 0.0, 0.2]], width=3), "a", "b")
-    assert not found(f.CentreOfMass, grouped)
-    assert not found(f.FirstStepReward, grouped)  # a group cannot be undiscounted
-    assert found(f.FirstReward, grouped)
-    assert not found(f.EqualTotals, grouped)  # no totals are known without a model
+    assert not found(forecast.CentreOfMass, grouped)
+    assert not found(forecast.FirstStepReward, grouped)  # a group cannot be undiscounted
+    assert found(forecast.FirstReward, grouped)
+    assert not found(contrast.EqualTotals, grouped)  # no totals are known without a model
 
 
 def test_crossings_are_found_at_their_step():
     explanation = explain(moment([[0.0, 0.0, 3.0, 0.0], [1.0, 0.5, 0.0, 0.0]]), "a", "b")
-    (crossing,) = found(f.Overtakes, explanation)
-    assert crossing == f.Overtakes("a", "b", 2, 3.0, 1.5)
-    assert found(f.MoreImmediate, explanation) == [f.MoreImmediate("b", "a", 1.5, 0.0, 1)]
+    (crossing,) = found(contrast.Overtakes, explanation)
+    assert crossing == contrast.Overtakes("a", "b", 2, 3.0, 1.5)
+    assert found(contrast.MoreImmediate, explanation) == [
+        contrast.MoreImmediate("b", "a", 1.5, 0.0, 1)
+    ]
 
 
 def test_costs_are_not_called_rewards():
     explanation = explain(moment([[-1.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]), "a", "b")
-    assert found(f.LessCostly, explanation)
-    assert not found(f.MoreImmediate, explanation)
-    assert not found(f.Peak, explanation)
+    assert found(contrast.LessCostly, explanation)
+    assert not found(contrast.MoreImmediate, explanation)
+    assert not found(forecast.Peak, explanation)
 
 
 @pytest.mark.parametrize(

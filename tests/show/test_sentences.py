@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explain.explanation import Explanation, explain
-from trdlab.explain.findings import Finding
+from trdlab.explain.finding import Finding
 from trdlab.explain.moment import Moment, WhatIf
 from trdlab.explain.tabular import gridworld_moment
 from trdlab.gridworld import Gridworld, load_map, map_names

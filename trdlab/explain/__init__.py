@@ -1,10 +1,8 @@
 """Explanations: an Estimator's decompositions in, findings with their evidence out."""
 
-from trdlab.explain.contrast import contrast, what_would_flip
 from trdlab.explain.explanation import Explanation, explain
-from trdlab.explain.findings import Finding
+from trdlab.explain.finding import Finding
 from trdlab.explain.flips import find_flips
-from trdlab.explain.forecast import forecast
 from trdlab.explain.moment import Moment, WhatIf
 from trdlab.explain.tabular import gridworld_moment, tabular_moment
 
@@ -13,11 +11,8 @@ __all__ = [
     "Finding",
     "Moment",
     "WhatIf",
-    "contrast",
     "explain",
     "find_flips",
-    "forecast",
     "gridworld_moment",
     "tabular_moment",
-    "what_would_flip",
 ]

@@ -1,30 +1,12 @@
-"""Contrast: how two actions' futures differ, and what would make the other one better."""
+"""Contrast: how two actions' futures differ."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from trdlab.explain.findings import (
-    Better,
-    BetterByDiscount,
-    DifferentTotals,
-    Dominates,
-    EqualTotals,
-    EqualValues,
-    Finding,
-    Flips,
-    LessCostly,
-    MoreImmediate,
-    NeverFlips,
-    NoTotal,
-    Overtakes,
-    Reasons,
-    SameComponents,
-    StaysAhead,
-    difference,
-    running_lead,
-)
-from trdlab.explain.flips import find_flips
+from trdlab.arrays import FloatArray
+from trdlab.explain.finding import Finding, agrees
 from trdlab.explain.moment import Moment, same
 
 
@@ -53,28 +35,6 @@ def contrast(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
         *_crossings(moment, action, foil),
         *_reasons(moment, action, foil),
     )
-
-
-def what_would_flip(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
-    """Returns where the preference flips as each quantity varies, or that it never does.
-
-    The policy is re-optimised at every value. A preference that stays the same but for ties counts
-    as never flipping.
-
-    Raises:
-        InputError: there is no such action.
-    """
-    i, j = moment.index(action), moment.index(foil)
-    found: list[Finding] = []
-    for what_if in moment.what_ifs:
-        name, low, high = what_if.name, what_if.low, what_if.high
-        at = find_flips(lambda x, w=what_if: w.gap(i, j, x), low, high)  # type: ignore[misc]
-        if at:
-            found.append(Flips(action, foil, name, what_if.current, low, high, at))
-        elif not same(moment.q_value(action), moment.q_value(foil)):
-            better, worse = _ordered(moment, action, foil)
-            found.append(NeverFlips(better, worse, name, low, high))
-    return tuple(found)
 
 
 def _totals(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
@@ -111,15 +71,9 @@ def _worth(moment: Moment, action: str, foil: str) -> Finding:
     gamma, a, b = moment.time_axis.gamma, moment.q_value(action), moment.q_value(foil)
     if same(a, b):
         return EqualValues(action, foil, gamma, a)
-    claim = (*_ordered(moment, action, foil), gamma, max(a, b), min(a, b))
+    claim = (*moment.ordered(action, foil), gamma, max(a, b), min(a, b))
     by_discount = BetterByDiscount(*claim)
     return by_discount if by_discount.holds(moment) else Better(*claim)
-
-
-def _ordered(moment: Moment, action: str, foil: str) -> tuple[str, str]:
-    """Returns the better of two actions, then the other."""
-    better_first = moment.q_value(action) > moment.q_value(foil)
-    return (action, foil) if better_first else (foil, action)
 
 
 def _crossings(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
@@ -138,7 +92,7 @@ def _crossings(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
 def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     if same(moment.q_value(action), moment.q_value(foil)):
         return ()
-    better, worse = _ordered(moment, action, foil)
+    better, worse = moment.ordered(action, foil)
     delta = difference(moment, better, worse)
     if len(delta) == 1:
         return ()
@@ -152,3 +106,235 @@ def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
         if advantage > against:
             break
     return (Reasons(better, worse, tuple(sorted(chosen)), advantage, against),)
+
+
+@dataclass(frozen=True)
+class EqualTotals(Finding):
+    """Both actions pay the same in total, undiscounted."""
+
+    action: str
+    foil: str
+    total: float
+
+    def holds(self, moment: Moment) -> bool:
+        a, b = moment.total(self.action), moment.total(self.foil)
+        return _close(a, b) and agrees(self.total, a)
+
+
+@dataclass(frozen=True)
+class DifferentTotals(Finding):
+    """One action pays more in total, undiscounted."""
+
+    more: str
+    less: str
+    more_total: float
+    less_total: float
+
+    def holds(self, moment: Moment) -> bool:
+        a, b = moment.total(self.more), moment.total(self.less)
+        return (
+            a > b and not _close(a, b) and agrees(self.more_total, a) and agrees(self.less_total, b)
+        )
+
+
+@dataclass(frozen=True)
+class NoTotal(Finding):
+    """An action has no undiscounted total: its rewards never end."""
+
+    action: str
+
+    def holds(self, moment: Moment) -> bool:
+        return moment.totals is not None and bool(np.isnan(moment.total(self.action)))
+
+
+@dataclass(frozen=True)
+class SameComponents(Finding):
+    """Both actions have the same decomposition."""
+
+    action: str
+    foil: str
+
+    def holds(self, moment: Moment) -> bool:
+        return not difference(moment, self.action, self.foil).any()
+
+
+@dataclass(frozen=True)
+class MoreImmediate(Finding):
+    """One action's running total leads from the first difference on, furthest at `last_step`."""
+
+    leader: str
+    other: str
+    leader_sum: float
+    other_sum: float
+    last_step: int
+
+    def holds(self, moment: Moment) -> bool:
+        return self._leads(moment) and self._leader_total(moment) > 0.0
+
+    def _leads(self, moment: Moment) -> bool:
+        axis = moment.time_axis
+        count = self._count(moment)
+        if self.last_step != count * axis.width - 1 or not 0 < count <= axis.horizon:
+            return False
+        lead = running_lead(moment, self.leader, self.other)[: axis.horizon]
+        first = int((lead != 0).argmax())
+        lost = int((lead[first:] <= 0).argmax()) or axis.horizon  # counted from the first lead on
+        other = moment.components(self.other)[:count].sum()
+        return (
+            bool((lead[first:count] > 0).all())
+            and int(lead[: first + lost].argmax()) == count - 1
+            and agrees(self.leader_sum, self._leader_total(moment))
+            and agrees(self.other_sum, float(other))
+        )
+
+    def _leader_total(self, moment: Moment) -> float:
+        return float(moment.components(self.leader)[: self._count(moment)].sum())
+
+    def _count(self, moment: Moment) -> int:
+        return (self.last_step + 1) // moment.time_axis.width
+
+
+@dataclass(frozen=True)
+class LessCostly(MoreImmediate):
+    """The same where the leader only loses less."""
+
+    def holds(self, moment: Moment) -> bool:
+        return self._leads(moment) and self._leader_total(moment) <= 0.0
+
+
+@dataclass(frozen=True)
+class Better(Finding):
+    """One action has the larger Q-value."""
+
+    better: str
+    worse: str
+    gamma: float
+    better_value: float
+    worse_value: float
+
+    def holds(self, moment: Moment) -> bool:
+        a, b = moment.q_value(self.better), moment.q_value(self.worse)
+        return (
+            a > b
+            and not same(a, b)
+            and agrees(self.gamma, moment.time_axis.gamma)
+            and agrees(self.better_value, a)
+            and agrees(self.worse_value, b)
+        )
+
+
+@dataclass(frozen=True)
+class BetterByDiscount(Better):
+    """The same where the undiscounted totals are equal: only the discount decides."""
+
+    def holds(self, moment: Moment) -> bool:
+        return _close(moment.total(self.better), moment.total(self.worse)) and super().holds(moment)
+
+
+@dataclass(frozen=True)
+class EqualValues(Finding):
+    """Both actions have the same Q-value."""
+
+    action: str
+    foil: str
+    gamma: float
+    value: float
+
+    def holds(self, moment: Moment) -> bool:
+        a, b = moment.q_value(self.action), moment.q_value(self.foil)
+        return same(a, b) and agrees(self.value, a) and agrees(self.gamma, moment.time_axis.gamma)
+
+
+@dataclass(frozen=True)
+class Overtakes(Finding):
+    """The running total of one action passes the other's at a component."""
+
+    leader: str
+    other: str
+    component: int
+    leader_total: float
+    other_total: float
+
+    def holds(self, moment: Moment) -> bool:
+        i = self.component
+        lead = np.sign(running_lead(moment, self.leader, self.other))
+        before = lead[:i][lead[:i] != 0]
+        leader = moment.components(self.leader)[: i + 1].sum()
+        other = moment.components(self.other)[: i + 1].sum()
+        return (
+            before.size > 0
+            and before[-1] < 0 < lead[i]
+            and agrees(self.leader_total, float(leader))
+            and agrees(self.other_total, float(other))
+        )
+
+
+@dataclass(frozen=True)
+class StaysAhead(Finding):
+    """The running total of one action is never behind, and ahead in the end."""
+
+    leader: str
+    other: str
+
+    def holds(self, moment: Moment) -> bool:
+        lead = running_lead(moment, self.leader, self.other)
+        return len(lead) > 1 and bool((lead >= 0).all()) and bool(lead[-1] > 0)
+
+
+@dataclass(frozen=True)
+class Dominates(Finding):
+    """One action is at least as good in every component, and better in some."""
+
+    better: str
+    worse: str
+
+    def holds(self, moment: Moment) -> bool:
+        delta = difference(moment, self.better, self.worse)
+        return len(delta) > 1 and bool((delta >= 0).all()) and bool((delta > 0).any())
+
+
+@dataclass(frozen=True)
+class Reasons(Finding):
+    """The fewest components whose advantage outweighs all that speaks for the worse action.
+
+    This is the minimal sufficient explanation of Juozapaitis et al. (2019), over time.
+    """
+
+    better: str
+    worse: str
+    components: tuple[int, ...]
+    advantage: float
+    disadvantage: float
+
+    def holds(self, moment: Moment) -> bool:
+        delta = difference(moment, self.better, self.worse)
+        if not self.components or max(self.components) >= len(delta):
+            return False
+        chosen, against = delta[list(self.components)], -delta[delta < 0].sum()
+        largest = np.argsort(-delta, kind="stable")[: len(chosen)]  # of equals the earlier
+        return (
+            self.components == tuple(sorted(largest))
+            and bool(chosen.sum() > against > 0)
+            and not delta[largest[:-1]].sum() > against
+            and agrees(self.advantage, float(chosen.sum()))
+            and agrees(self.disadvantage, float(against))
+        )
+
+
+def difference(moment: Moment, action: str, foil: str) -> FloatArray:
+    """Returns `[N+1]`: action minus foil, with exact zeros where they only differ by rounding."""
+    a, b = moment.components(action), moment.components(foil)
+    equal = np.abs(a - b) <= 1e-12 * np.maximum(np.abs(a), np.abs(b))
+    return np.where(equal, 0.0, a - b)
+
+
+def running_lead(moment: Moment, action: str, foil: str) -> FloatArray:
+    """Returns `[N+1]`: how far the action's running total is ahead, 0 where only by rounding."""
+    a, b = (np.cumsum(moment.components(name)) for name in (action, foil))
+    lead = np.cumsum(difference(moment, action, foil))
+    equal = np.abs(a - b) <= 1e-12 * np.maximum(np.abs(a), np.abs(b))
+    return np.where(equal, 0.0, lead)
+
+
+def _close(a: float, b: float) -> bool:
+    return abs(a - b) <= 1e-9 * max(1.0, abs(a), abs(b))

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
-from trdlab.explain.contrast import contrast, what_would_flip
-from trdlab.explain.findings import Finding, TiedActions, TiedLater, WhoseFuture
+from trdlab.explain.contrast import contrast
+from trdlab.explain.finding import Finding
+from trdlab.explain.flips import what_would_flip
 from trdlab.explain.forecast import forecast
 from trdlab.explain.moment import Moment
 
@@ -61,3 +62,33 @@ def explain(moment: Moment, action: str | None = None, foil: str | None = None) 
         forecast=forecast(moment, action),
         context=(WhoseFuture(moment.future.policy), *ties, *later),
     )
+
+
+@dataclass(frozen=True)
+class WhoseFuture(Finding):
+    """Who acts after the first action."""
+
+    policy: str
+
+    def holds(self, moment: Moment) -> bool:
+        return self.policy == moment.future.policy
+
+
+@dataclass(frozen=True)
+class TiedActions(Finding):
+    """Several optimal actions tie here, and their futures differ."""
+
+    actions: tuple[str, ...]
+
+    def holds(self, moment: Moment) -> bool:
+        return len(self.actions) > 1 and self.actions == moment.tied
+
+
+@dataclass(frozen=True)
+class TiedLater(Finding):
+    """Optimal actions tie in later states, and their futures differ."""
+
+    states: int
+
+    def holds(self, moment: Moment) -> bool:
+        return self.states > 0 and self.states == moment.tied_later

@@ -1,16 +1,43 @@
-"""Where a preference flips: all sign changes of a gap over an interval, refined."""
+"""Where a preference flips as γ or a reward varies, the policy re-optimised."""
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal
 from itertools import pairwise
 
 import numpy as np
+
+from trdlab.explain.finding import Finding, Shown, agrees
+from trdlab.explain.moment import Moment, WhatIf, same
 
 SAMPLES = 64
 _PRECISION = 1e-13
 _DIP_STEPS = 40
 
 Gap = Callable[[float], float]
+
+
+def what_would_flip(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
+    """Returns where the preference flips as each quantity varies, or that it never does.
+
+    The policy is re-optimised at every value. A preference that stays the same but for ties counts
+    as never flipping.
+
+    Raises:
+        InputError: there is no such action.
+    """
+    i, j = moment.index(action), moment.index(foil)
+    found: list[Finding] = []
+    for what_if in moment.what_ifs:
+        name, low, high = what_if.name, what_if.low, what_if.high
+        at = find_flips(lambda x, w=what_if: w.gap(i, j, x), low, high)  # type: ignore[misc]
+        if at:
+            found.append(Flips(action, foil, name, what_if.current, low, high, at))
+        elif not same(moment.q_value(action), moment.q_value(foil)):
+            better, worse = moment.ordered(action, foil)
+            found.append(NeverFlips(better, worse, name, low, high))
+    return tuple(found)
 
 
 def find_flips(gap: Gap, low: float, high: float, *, samples: int = SAMPLES) -> tuple[float, ...]:
@@ -86,3 +113,66 @@ def _root(gap: Gap, low: float, high: float, at_low: float, at_high: float) -> f
             if at_a * at_b < 0.0:
                 low, at_low, high, at_high = a, at_a, b, at_b
     return root
+
+
+@dataclass(frozen=True)
+class Flips(Finding):
+    """The values of one quantity at which the preference between two actions flips."""
+
+    action: str
+    foil: str
+    quantity: str
+    current: float
+    low: float
+    high: float
+    at: tuple[float, ...]
+
+    def holds(self, moment: Moment) -> bool:
+        what_if = _what_if(moment, self.quantity)
+        if what_if is None or not agrees(self.current, what_if.current):
+            return False
+        if not (agrees(self.low, what_if.low) and agrees(self.high, what_if.high)):
+            return False
+        if sorted(self.at) != list(self.at) or not self.at:
+            return False
+        i, j = moment.index(self.action), moment.index(self.foil)
+        signs = [np.sign(what_if.gap(i, j, x)) for x in _around(self, what_if)]
+        return all(a * b < 0 for a, b in zip(signs[::2], signs[1::2], strict=True)) and all(
+            a == b for a, b in zip(signs[1:-1:2], signs[2::2], strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class NeverFlips(Finding):
+    """The preference stays the same over all values of one quantity."""
+
+    better: str
+    worse: str
+    quantity: str
+    low: float
+    high: float
+
+    def holds(self, moment: Moment) -> bool:
+        what_if = _what_if(moment, self.quantity)
+        if what_if is None:
+            return False
+        if not (agrees(self.low, what_if.low) and agrees(self.high, what_if.high)):
+            return False
+        i, j = moment.index(self.better), moment.index(self.worse)
+        gaps = [what_if.gap(i, j, x) for x in np.linspace(what_if.low, what_if.high, 23)]
+        return min(gaps) >= 0.0 and max(gaps) > 0.0
+
+
+def _what_if(moment: Moment, name: str) -> WhatIf | None:
+    return next((what_if for what_if in moment.what_ifs if what_if.name == name), None)
+
+
+def _around(flips: Flips, what_if: WhatIf) -> list[float]:
+    """Returns a value just below and just above each flip, half a unit of its last digit away."""
+    around = []
+    for root in flips.at:
+        half = 1e-7 * max(1.0, abs(root))
+        if isinstance(root, Shown):
+            half = 0.5000001 * 10.0 ** int(Decimal(root.text).as_tuple().exponent)
+        around += [max(root - half, what_if.low), min(root + half, what_if.high)]
+    return around

@@ -1,20 +1,11 @@
 """Forecast: what one action is expected to pay, and when."""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
-from trdlab.explain.findings import (
-    AllBeyond,
-    CentreOfMass,
-    EarnsNothing,
-    Finding,
-    FirstCost,
-    FirstReward,
-    FirstStepCost,
-    FirstStepReward,
-    Peak,
-    ShareBeyond,
-    one_sign,
-)
+from trdlab.explain.finding import Finding, agrees, one_sign
 from trdlab.explain.moment import Moment
 
 
@@ -58,3 +49,123 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
     if one_sign(row) and row[-1] != 0.0:
         findings.append(ShareBeyond(action, float(row[-1] / value), axis.horizon))
     return tuple(findings)
+
+
+@dataclass(frozen=True)
+class EarnsNothing(Finding):
+    """No component of an action differs from zero."""
+
+    action: str
+
+    def holds(self, moment: Moment) -> bool:
+        return not moment.components(self.action).any()
+
+
+@dataclass(frozen=True)
+class AllBeyond(Finding):
+    """All of an action's value lies in the residual."""
+
+    action: str
+    value: float
+    component: int
+
+    def holds(self, moment: Moment) -> bool:
+        row = moment.components(self.action)
+        at_end = self.component == moment.time_axis.horizon > 0
+        return at_end and not row[:-1].any() and row[-1] != 0.0 and agrees(self.value, row[-1])
+
+
+@dataclass(frozen=True)
+class FirstReward(Finding):
+    """The first component of an action that is not zero, where it is positive."""
+
+    sign: ClassVar[float] = 1.0
+
+    action: str
+    component: int
+    discounted: float
+
+    def holds(self, moment: Moment) -> bool:
+        row, i = moment.components(self.action), self.component
+        is_first = i < moment.time_axis.horizon and not row[:i].any()
+        return is_first and bool(row[i] * self.sign > 0.0) and agrees(self.discounted, row[i])
+
+
+@dataclass(frozen=True)
+class FirstCost(FirstReward):
+    """The same where that component is negative."""
+
+    sign: ClassVar[float] = -1.0
+
+
+@dataclass(frozen=True)
+class FirstStepReward(FirstReward):
+    """The same for w = 1, where the discount can be taken out exactly."""
+
+    reward: float
+
+    def holds(self, moment: Moment) -> bool:
+        axis = moment.time_axis
+        if axis.width != 1 or axis.gamma == 0.0 or not super().holds(moment):
+            return False
+        true = moment.components(self.action)[self.component] / axis.gamma**self.component
+        return agrees(self.reward, float(true))
+
+
+@dataclass(frozen=True)
+class FirstStepCost(FirstStepReward):
+    """The same where that reward is negative."""
+
+    sign: ClassVar[float] = -1.0
+
+
+@dataclass(frozen=True)
+class Peak(Finding):
+    """The largest explicit component (of equals the first), where several are not zero."""
+
+    action: str
+    component: int
+    discounted: float
+
+    def holds(self, moment: Moment) -> bool:
+        row, i = moment.components(self.action), self.component
+        explicit = row[:-1]
+        return (
+            i < moment.time_axis.horizon
+            and bool(explicit[i] > 0.0 and (explicit[i] >= explicit).all())
+            and not (explicit[:i] == explicit[i]).any()
+            and int(np.count_nonzero(explicit)) > 1
+            and agrees(self.discounted, row[i])
+        )
+
+
+@dataclass(frozen=True)
+class ShareBeyond(Finding):
+    """The share of an action's value that lies in the residual; components of one sign only."""
+
+    action: str
+    share: float
+    component: int
+
+    def holds(self, moment: Moment) -> bool:
+        row = moment.components(self.action)
+        return (
+            self.component == moment.time_axis.horizon > 0
+            and one_sign(row)
+            and row[-1] != 0.0
+            and agrees(self.share, float(row[-1] / row.sum()))
+        )
+
+
+@dataclass(frozen=True)
+class CentreOfMass(Finding):
+    """The mean step of an action's explicit rewards, weighted by amount; w = 1, one sign."""
+
+    action: str
+    step: float
+
+    def holds(self, moment: Moment) -> bool:
+        explicit = moment.components(self.action)[:-1]
+        if moment.time_axis.width != 1 or not one_sign(explicit):
+            return False
+        return agrees(self.step, float(explicit @ np.arange(len(explicit)) / explicit.sum()))

@@ -107,6 +107,10 @@ class Moment:
         """Returns the undiscounted total of one action, NaN where none exists or is known."""
         return float("nan") if self.totals is None else float(self.totals[self.index(action)])
 
+    def ordered(self, action: str, foil: str) -> tuple[str, str]:
+        """Returns the better of two actions, then the other."""
+        return (action, foil) if self.q_value(action) > self.q_value(foil) else (foil, action)
+
     def pair(self, action: str | None, foil: str | None) -> tuple[str, str | None]:
         """Returns the action to explain and its foil, filling in what was not asked for.
 

@@ -12,53 +12,85 @@ from typing import Any
 
 from trdlab.decomposition import step_label
 from trdlab.errors import TrdlabError
-from trdlab.explain import findings as f
+from trdlab.explain import contrast, explanation, flips, forecast
 from trdlab.explain.explanation import Explanation
-from trdlab.explain.findings import Finding, Shown
+from trdlab.explain.finding import Finding, Shown
 from trdlab.formatting import amount, decimals_between, number, plain, significant
 
 TEMPLATES: dict[type[Finding], str] = {
-    f.EqualTotals: "Both routes pay {total:amount} in total.",
-    f.DifferentTotals: "In total {more} pays {more_total:amount} and {less} {less_total:amount}.",
-    f.NoTotal: "The rewards of {action} never end, so they have no undiscounted total.",
-    f.MoreImmediate: "{leader} gives more immediate rewards than {other}: {leader_sum:value} "
-    "against {other_sum:value} by {last_step:step}.",
-    f.LessCostly: "{leader} costs less at first than {other}: {leader_sum:value} against "
-    "{other_sum:value} by {last_step:step}.",
-    f.SameComponents: "{action} and {foil} promise the same rewards at the same times.",
-    f.BetterByDiscount: "Only the discount tells them apart: with γ = {gamma:plain} {better} is "
-    "worth {better_value:value} and {worse} {worse_value:value}.",
-    f.Better: "With γ = {gamma:plain} {better} is worth {better_value:value} and {worse} "
-    "{worse_value:value}.",
-    f.EqualValues: "With γ = {gamma:plain} {action} and {foil} are both worth {value:value}.",
-    f.Overtakes: "Counted as they come in, the rewards of {leader} overtake those of {other} at "
-    "{component:label}: {leader_total:value} against {other_total:value}.",
-    f.StaysAhead: "{other} never catches up with {leader}.",
-    f.Dominates: "Nothing speaks for {worse}: no component is larger than that of {better}.",
-    f.Reasons: "To prefer {better} it is enough to look at {components:labels}: "
-    "{advantage:value} more there, against {disadvantage:value} for {worse} elsewhere.",
-    f.Flips: "The preference flips where {quantity} is {at:roots} instead of {current:plain} "
-    "(searched from {low:plain} to {high:plain}, policy re-optimised).",
-    f.NeverFlips: "No value of {quantity} from {low:plain} to {high:plain} would make {worse} "
-    "better than {better} (policy re-optimised).",
-    f.EarnsNothing: "{action} earns nothing.",
-    f.AllBeyond: "All of the {value:value} that {action} is worth lies at {component:label}.",
-    f.FirstStepReward: "The first reward after {action} comes at {component:label}: "
-    "{reward:amount}, worth {discounted:value} now.",
-    f.FirstReward: "The first reward after {action} comes at {component:label}, worth "
-    "{discounted:value} now.",
-    f.FirstStepCost: "{action} first costs something at {component:label}: {reward:amount}, worth "
-    "{discounted:value} now.",
-    f.FirstCost: "{action} first costs something at {component:label}, worth "
-    "{discounted:value} now.",
-    f.Peak: "The largest expected reward of {action} comes at {component:label}: "
-    "{discounted:value}.",
-    f.CentreOfMass: "The rewards of {action} before the residual centre on t+{step:value}.",
-    f.ShareBeyond: "{share:percent} of the value of {action} lies at {component:label}.",
-    f.WhoseFuture: "After the first action it is the future of {policy}.",
-    f.TiedActions: "Here {actions:names} tie: their values are equal, their futures are not.",
-    f.TiedLater: "Later states in which optimal actions tie but their futures differ: "
-    "{states:count}.",
+    contrast.EqualTotals: "Both routes pay {total:amount} in total.",
+    contrast.DifferentTotals: (
+        "In total {more} pays {more_total:amount} and {less} {less_total:amount}."
+    ),
+    contrast.NoTotal: "The rewards of {action} never end, so they have no undiscounted total.",
+    contrast.MoreImmediate: (
+        "{leader} gives more immediate rewards than {other}: {leader_sum:value} against "
+        "{other_sum:value} by {last_step:step}."
+    ),
+    contrast.LessCostly: (
+        "{leader} costs less at first than {other}: {leader_sum:value} against {other_sum:value} "
+        "by {last_step:step}."
+    ),
+    contrast.SameComponents: "{action} and {foil} promise the same rewards at the same times.",
+    contrast.BetterByDiscount: (
+        "Only the discount tells them apart: with γ = {gamma:plain} {better} is worth "
+        "{better_value:value} and {worse} {worse_value:value}."
+    ),
+    contrast.Better: (
+        "With γ = {gamma:plain} {better} is worth {better_value:value} and {worse} "
+        "{worse_value:value}."
+    ),
+    contrast.EqualValues: (
+        "With γ = {gamma:plain} {action} and {foil} are both worth {value:value}."
+    ),
+    contrast.Overtakes: (
+        "Counted as they come in, the rewards of {leader} overtake those of {other} at "
+        "{component:label}: {leader_total:value} against {other_total:value}."
+    ),
+    contrast.StaysAhead: "{other} never catches up with {leader}.",
+    contrast.Dominates: "Nothing speaks for {worse}: no component is larger than that of {better}.",
+    contrast.Reasons: (
+        "To prefer {better} it is enough to look at {components:labels}: {advantage:value} more "
+        "there, against {disadvantage:value} for {worse} elsewhere."
+    ),
+    flips.Flips: (
+        "The preference flips where {quantity} is {at:roots} instead of {current:plain} (searched"
+        " from {low:plain} to {high:plain}, policy re-optimised)."
+    ),
+    flips.NeverFlips: (
+        "No value of {quantity} from {low:plain} to {high:plain} would make {worse} better than "
+        "{better} (policy re-optimised)."
+    ),
+    forecast.EarnsNothing: "{action} earns nothing.",
+    forecast.AllBeyond: (
+        "All of the {value:value} that {action} is worth lies at {component:label}."
+    ),
+    forecast.FirstStepReward: (
+        "The first reward after {action} comes at {component:label}: {reward:amount}, worth "
+        "{discounted:value} now."
+    ),
+    forecast.FirstReward: (
+        "The first reward after {action} comes at {component:label}, worth {discounted:value} now."
+    ),
+    forecast.FirstStepCost: (
+        "{action} first costs something at {component:label}: {reward:amount}, worth "
+        "{discounted:value} now."
+    ),
+    forecast.FirstCost: (
+        "{action} first costs something at {component:label}, worth {discounted:value} now."
+    ),
+    forecast.Peak: (
+        "The largest expected reward of {action} comes at {component:label}: {discounted:value}."
+    ),
+    forecast.CentreOfMass: "The rewards of {action} before the residual centre on t+{step:value}.",
+    forecast.ShareBeyond: "{share:percent} of the value of {action} lies at {component:label}.",
+    explanation.WhoseFuture: "After the first action it is the future of {policy}.",
+    explanation.TiedActions: (
+        "Here {actions:names} tie: their values are equal, their futures are not."
+    ),
+    explanation.TiedLater: (
+        "Later states in which optimal actions tie but their futures differ: {states:count}."
+    ),
 }
 
 _NUMBER = r"-?(?:\d+(?:\.\d+)?(?:e[+-]?\d+)?|inf)"

@@ -1,0 +1,61 @@
+"""A finding: one small true statement about a moment, with the numbers that support it.
+
+Each one can check itself: `holds(moment)` tests the claim by its definition, not by the search
+that found it. The numbers it compares may be exact, or `Shown`: read back from printed text.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+from trdlab.arrays import FloatArray
+from trdlab.explain.moment import Moment, same
+
+
+class Shown(float):
+    """A number as it stood in a text; it equals every number that is printed the same way."""
+
+    text: str
+    reprint: Callable[[float], str]
+
+    def __new__(cls, text: str, reprint: Callable[[float], str]) -> "Shown":
+        """Reads the number; `reprint` prints another one in the same manner."""
+        shown = super().__new__(cls, text)
+        shown.text, shown.reprint = text, reprint
+        return shown
+
+
+def agrees(claimed: float, true: float) -> bool:
+    """Returns whether a claimed number is the true one, at the precision it was claimed in."""
+    if isinstance(claimed, Shown):
+        return claimed.reprint(true) == claimed.text
+    return same(claimed, true) or abs(claimed - true) <= 1e-9 * max(1.0, abs(true))
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Base class: a claim and its numbers."""
+
+    kinds: ClassVar[dict[str, type["Finding"]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        cls.kinds[cls.kind()] = cls
+
+    @classmethod
+    def kind(cls) -> str:
+        """Returns the name of the claim, as JSON carries it: `first-reward`."""
+        return re.sub(r"(?<!^)([A-Z])", r"-\1", cls.__name__).lower()
+
+    def holds(self, moment: Moment) -> bool:
+        """Returns whether the claim is true of a moment, tested by its definition."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the kind and the numbers as plain data."""
+        return {"kind": self.kind()} | {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+def one_sign(row: FloatArray) -> bool:
+    """Returns whether shares and means of components make sense: one sign, and not all zero."""
+    return bool(row.any() and ((row >= 0.0).all() or (row <= 0.0).all()))

@@ -1,5 +1,6 @@
 """Decompositions of every state and action of a model, as an Estimator."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,6 +13,9 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.tabular.mdp import MDP, as_policy
 from trdlab.tabular.solve import Solution, Ties, evaluate, optimal
+
+MAX_GIGABYTES = 4.0
+MAX_STEPS = 1_000_000
 
 _TIED_POLICIES = {
     "lowest": "the optimal policy",
@@ -66,17 +70,25 @@ class ExactTable:
 
     @cached_property
     def ambiguous(self) -> BoolArray:
-        """`[S]`: states where optimal actions tie and their decompositions differ.
+        """`[S]`: states where optimal actions tie and pay at different steps.
 
         Where no state is ambiguous, every tied optimal policy has the same decomposition: the
-        vectors then obey one linear equation, whichever of the tied actions is taken.
+        vectors then obey one linear equation, whichever of the tied actions is taken. For w > 1
+        single steps are compared: what differs inside a group here can fall into two groups as
+        seen from an earlier state.
         """
-        tied = self.solution.tied[..., None]
-        components = self.decomposition.components
-        high = np.where(tied, components, -np.inf).max(axis=1)
-        low = np.where(tied, components, np.inf).min(axis=1)
-        slack = 1e-9 * np.maximum(1.0, np.abs(components).max())
-        return np.asarray((high - low).max(axis=1) > slack) & tied[..., 0].any(axis=1)
+        tied, spread = self.solution.tied, np.zeros(self.mdp.num_states)
+        if tied.any():
+            singly = self.time_axis.width == 1
+            for part in (
+                np.moveaxis(self.decomposition.components, -1, 0)
+                if singly
+                else _single_steps(self.mdp, self.solution, self.time_axis)
+            ):
+                high = np.where(tied, part, -np.inf).max(axis=1)
+                low = np.where(tied, part, np.inf).min(axis=1)
+                spread = np.maximum(spread, high - low)  # -inf where nothing ties
+        return np.asarray(spread > 1e-9 * max(1.0, np.abs(self.decomposition.components).max()))
 
 
 def exact(
@@ -96,7 +108,7 @@ def exact(
         ties: whose future is told where optimal actions tie.
 
     Raises:
-        InputError: `policy` is no policy of this model.
+        InputError: `policy` is no policy of this model, or N is too large for it.
 
     Source: the paper's Eqs. trd-array and trd-binned-array, and Appendix A.
 
@@ -118,12 +130,35 @@ def exact(
 
 def decompose(mdp: MDP, solution: Solution, time_axis: TimeAxis) -> FloatArray:
     """Returns `[S, A, N+1]`: the components of a solved policy's future (see `exact`)."""
-    gamma, policy = time_axis.gamma, solution.policy
+    _check_size(mdp, time_axis)
     components = np.zeros((mdp.num_states, mdp.num_actions, time_axis.num_components))
+    for step, part in enumerate(_single_steps(mdp, solution, time_axis)):
+        components[..., step // time_axis.width] += part
+    return components
+
+
+def _single_steps(mdp: MDP, solution: Solution, time_axis: TimeAxis) -> Iterator[FloatArray]:
+    """Yields `[S, A]` for each of the N·w steps, the expected discounted reward; then the rest."""
+    gamma, policy = time_axis.gamma, solution.policy
     step_reward, beyond = mdp.expected_rewards, solution.q_values  # both [S, A]
-    for step in range(time_axis.num_steps):
-        components[..., step // time_axis.width] += step_reward
+    for _ in range(time_axis.num_steps):
+        yield step_reward
         step_reward = gamma * mdp.expect((policy * step_reward).sum(axis=1))
         beyond = gamma * mdp.expect((policy * beyond).sum(axis=1))
-    components[..., -1] = beyond
-    return components
+        if not step_reward.any() and not beyond.any():
+            return  # all is over, or too far away for a float
+    yield beyond
+
+
+def _check_size(mdp: MDP, axis: TimeAxis) -> None:
+    gigabytes = mdp.num_states * mdp.num_actions * axis.num_components * 8 / 1e9
+    if gigabytes > MAX_GIGABYTES:
+        raise InputError(
+            f"N = {axis.horizon} takes {gigabytes:.3g} GB for {mdp.num_states} states and "
+            f"{mdp.num_actions} actions.",
+            "Choose a smaller N; a larger w reaches as far.",
+        )
+    if axis.num_steps > MAX_STEPS:
+        raise InputError(
+            f"N·w = {axis.num_steps} steps are too many.", f"At most {MAX_STEPS} can be followed."
+        )

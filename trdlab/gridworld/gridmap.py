@@ -291,7 +291,7 @@ def _parse_wind(text: str) -> Wind:
     direction, *strengths = text.split() or [""]
     if direction not in ACTIONS:
         raise MapError(f"The wind blows '{direction}'.", closest(direction, ACTIONS))
-    if not all(s.isascii() and s.isdigit() and int(s[:9]) <= MAX_WIND for s in strengths):
+    if not all(len(s) < 9 and s.isdecimal() and int(s) <= MAX_WIND for s in strengths):
         raise MapError(
             f"Cannot read the wind strengths '{' '.join(strengths)}'.",
             f"Write a whole number from 0 to {MAX_WIND} for each column (or row).",

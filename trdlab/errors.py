@@ -43,6 +43,7 @@ def closest(name: str, known: Iterable[str]) -> str:
     """
     from difflib import get_close_matches
 
-    options = sorted(known)
-    near = get_close_matches(name, options, n=1)
-    return f"Did you mean '{near[0]}'?" if near else f"Known: {', '.join(options)}."
+    names = sorted(known)
+    options = {option.lower(): option for option in names}
+    near = get_close_matches(name.lower(), options, n=1)
+    return f"Did you mean '{options[near[0]]}'?" if near else f"Known: {', '.join(names)}."

@@ -25,6 +25,8 @@ def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = Fal
     folder = path.parent
     try:
         has_folder, is_folder, exists = folder.is_dir(), path.is_dir(), path.exists()
+        with suppress(FileNotFoundError, NotADirectoryError):
+            path.stat()  # raises where no file can have this name
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise OutputError(f"Cannot write '{path}': {reason}.", "Choose another name.") from error

@@ -267,6 +267,19 @@ def test_ranges_that_cannot_be_are_refused(lowest, highest, message):
         drone()[1].undiscounted_bounds(lowest, highest)
 
 
+def test_the_residual_is_bounded_on_one_side_by_rewards_of_one_sign():
+    tail = RewardDecomposition([0.0, -0.5], TimeAxis(0.5, 1))  # −1 at its own start
+    for lowest, highest, bounds in (
+        (-3, 0, (-np.inf, -1)),
+        (-np.inf, 0, (-np.inf, -1)),
+        (-1, 1, (-np.inf, np.inf)),  # +1 late weighs little, and so does −1
+    ):
+        low, high = tail.undiscounted_bounds(lowest, highest)
+        assert (low[1], high[1]) == bounds
+    nothing = RewardDecomposition([0.0, 0.0], TimeAxis(0.5, 1)).undiscounted_bounds()
+    assert [bound.tolist() for bound in nothing] == [[0, 0], [0, 0]]
+
+
 def test_a_residual_outside_the_range_is_refused_too():
     with pytest.raises(InputError, match="Widen the range"):
         RewardDecomposition([0, 0, -1], PAPER).undiscounted_bounds(0, 1)

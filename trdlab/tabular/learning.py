@@ -52,7 +52,9 @@ def learn(
     and control takes a window from every step: what it seldom visits it learns badly.
 
     An entry's n-th update has the step size (1 + (1 − γ^w)·n)^(−0.7), and the result is the
-    average of the tables of all times, weighted 1, 2, 3, …
+    average of the tables of all times, weighted 1, 2, 3, … The average also says which action is
+    greedy: in the newest table, noise keeps turning the order of two nearly equal actions, and
+    with it the components, which may differ much even where Q hardly does.
 
     Args:
         world: a model, or a Gymnasium environment or vector environment with discrete
@@ -107,7 +109,7 @@ def learn(
 
     for turn in range(-(-agent_steps // worlds.num_envs)):  # rounded up
         here = worlds.observations  # [B]
-        greedy = table.sum(axis=2).argmax(axis=1)  # [S]
+        greedy = mean_table.sum(axis=2).argmax(axis=1)  # [S]
         evaluated = epsilon_greedy(greedy, num_actions, 0.0) if given is None else given  # [S, A]
         behaviour = epsilon_greedy(greedy, num_actions, epsilon) if given is None else given
         first = evenly_begun & (builder.elapsed % width == 0)  # [B]

@@ -7,30 +7,46 @@ from trdlab.tabular.solve import Solution, Ties, evaluate, improved, optimal, un
 from trdlab.tabular.table import ExactTable, exact
 
 if TYPE_CHECKING:
+    from trdlab.tabular.environments import from_environment
     from trdlab.tabular.learned import LearnedTable
     from trdlab.tabular.learning import learn
+    from trdlab.tabular.models import from_arrays
+    from trdlab.tabular.named import Coordinate, TabularWorld
     from trdlab.tabular.operator import OperatorTable, operator_table
+    from trdlab.tabular.toytext import make_world, tabular_world
     from trdlab.tabular.windows import WindowBuilder, Windows
 
 __all__ = [
     "MDP",
+    "Coordinate",
     "ExactTable",
     "LearnedTable",
     "OperatorTable",
     "Solution",
+    "TabularWorld",
     "Ties",
     "WindowBuilder",
     "Windows",
     "evaluate",
     "exact",
+    "from_arrays",
+    "from_environment",
     "improved",
     "learn",
+    "make_world",
     "operator_table",
     "optimal",
+    "tabular_world",
     "undiscounted_totals",
 ]
 
 _HOMES = {
+    "Coordinate": "trdlab.tabular.named",
+    "TabularWorld": "trdlab.tabular.named",
+    "from_arrays": "trdlab.tabular.models",
+    "from_environment": "trdlab.tabular.environments",
+    "make_world": "trdlab.tabular.toytext",
+    "tabular_world": "trdlab.tabular.toytext",
     "LearnedTable": "trdlab.tabular.learned",
     "learn": "trdlab.tabular.learning",
     "OperatorTable": "trdlab.tabular.operator",
@@ -41,7 +57,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    """Imports what concerns learning when it is first asked for: the exact solver starts faster."""
+    """Imports what the exact solver does not need when it is first asked for: it starts faster."""
     if name not in _HOMES:
         raise AttributeError(f"module 'trdlab.tabular' has no attribute '{name}'")
     from importlib import import_module

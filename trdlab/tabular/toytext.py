@@ -1,0 +1,220 @@
+"""Gymnasium's environments with a transition table, made by id and put into words."""
+
+import inspect
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from trdlab.errors import InputError, TrdlabError, closest
+from trdlab.formatting import amount
+from trdlab.tabular.environments import environment_name, from_environment, start_distribution
+from trdlab.tabular.mdp import MDP
+from trdlab.tabular.named import AGENT, Coordinate, TabularWorld
+
+
+def tabular_world(env: Any) -> TabularWorld:
+    """Returns the model of an environment, and the words for what is known of it.
+
+    FrozenLake, CliffWalking and Taxi are known; of others states and actions have numbers.
+
+    Args:
+        env: a Gymnasium environment (see `from_environment`).
+
+    Raises:
+        InputError: it has no transition table, or a bad one.
+
+    >>> import gymnasium
+    >>> world = tabular_world(gymnasium.make("FrozenLake-v1"))
+    >>> world.describe(6), world.find_state("1,2"), world.action_names
+    ('row 1, column 2', 6, ('left', 'down', 'right', 'up'))
+    >>> print(world.draw(6))
+    SFFF
+    FH@H
+    FFFH
+    HFFG
+    """
+    mdp, base, spec = from_environment(env), env.unwrapped, env.spec
+    own = tuple(map(str, getattr(base, "action_names", ())))
+    words: dict[str, Any] = {"action_names": own}
+    for kind in type(base).__mro__:
+        if kind.__name__ in _KNOWN:
+            words = _KNOWN[kind.__name__](base, mdp)
+            break
+    sizes = [coordinate.size for coordinate in words.get("coordinates", ())]
+    if len(words["action_names"]) != mdp.num_actions or int(np.prod(sizes or mdp.num_states)) != (
+        mdp.num_states
+    ):
+        words = {"action_names": tuple(f"action {i}" for i in range(mdp.num_actions))}
+    return TabularWorld(
+        mdp,
+        environment_name(env),
+        **words,
+        arguments=_defaults(type(base)) | dict(spec.kwargs if spec else {}),
+        starts=start_distribution(env),
+        time_limit=spec.max_episode_steps if spec else None,
+    )
+
+
+def make_world(env_id: str, arguments: Mapping[str, Any] | None = None) -> TabularWorld:
+    """Makes an environment by its Gymnasium id, and returns its model in words.
+
+    Args:
+        env_id: such as `FrozenLake-v1`, or `module:id` to import a module first.
+        arguments: what to make it with, such as `{"is_slippery": False}`.
+
+    Raises:
+        InputError: there is no such environment, it does not take the arguments, or it has no
+            transition table.
+    """
+    import gymnasium
+
+    given = dict(arguments or {})
+    known = toy_text_ids()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # an id without a version, or an old one
+            module, _, name = env_id.rpartition(":")
+            if module:
+                import_module(module)
+            _check_arguments(name, gymnasium.spec(name).entry_point, given)
+            env = gymnasium.make(name, disable_env_checker=True, **given)
+    except TrdlabError:
+        raise
+    except gymnasium.error.DependencyNotInstalled as error:
+        raise InputError(f"{env_id} cannot be made: {error}.", "Install what it needs.") from error
+    except gymnasium.error.Error as error:
+        raise InputError(f"There is no environment '{env_id}'.", closest(env_id, known)) from error
+    except ImportError as error:
+        raise InputError(
+            f"{env_id} cannot be imported: {error}.", "Install what it needs, or check the id."
+        ) from error
+    except (TypeError, ValueError, LookupError, AssertionError, AttributeError) as error:
+        made = f" with {say_arguments(given)}" if given else ""
+        raise InputError(
+            f"{env_id} cannot be made{made} ({type(error).__name__}: {error}).",
+            "Its documentation says what each argument takes.",
+        ) from error
+    world = tabular_world(env)
+    env.close()
+    return world
+
+
+def toy_text_ids() -> list[str]:
+    """Returns the ids of the environments with a transition table that come with Gymnasium."""
+    import gymnasium
+
+    specs = [spec for spec in gymnasium.registry.values() if ".toy_text." in str(spec.entry_point)]
+    return [spec.id for spec in specs if not spec.name.startswith("Blackjack")]
+
+
+def say_arguments(arguments: Mapping[str, Any]) -> str:
+    """Returns arguments as they are written on the command line.
+
+    >>> say_arguments({"map_name": "8x8", "is_slippery": False})
+    'map_name=8x8, is_slippery=false'
+    """
+    return ", ".join(
+        f"{name}={str(value).lower() if isinstance(value, bool) else value}"
+        for name, value in arguments.items()
+    )
+
+
+def _check_arguments(env_id: str, creator: Any, given: Iterable[str]) -> None:
+    from gymnasium.envs.registration import load_env_creator
+
+    function = load_env_creator(creator) if isinstance(creator, str) else creator
+    parameters = inspect.signature(function).parameters
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
+        return
+    for name in given:
+        if name not in parameters:
+            names = [known for known in parameters if known != "render_mode"]
+            raise InputError(f"{env_id} takes no argument '{name}'.", closest(name, names))
+
+
+def _defaults(kind: type) -> dict[str, Any]:
+    """Returns what an environment is made with when nothing is said; without the rendering."""
+    parameters = inspect.signature(kind).parameters.values()
+    return {
+        p.name: p.default
+        for p in parameters
+        if p.default is not p.empty and p.default is not None and p.name != "render_mode"
+    }
+
+
+# ---- the environments whose states have names ----------------------------------------------------
+
+
+def _frozen_lake(env: Any, mdp: MDP) -> dict[str, Any]:
+    grid = tuple(b"".join(row).decode() for row in env.desc)
+    tiles = "".join(grid)
+    words = {"S": "start", "F": "frozen", "H": "hole", "G": "goal"}
+    legend = [
+        f"{symbol} {word}{_effect(mdp, [i for i, tile in enumerate(tiles) if tile == symbol])}"
+        for symbol, word in words.items()
+        if symbol in tiles
+    ]
+    return {
+        "action_names": ("left", "down", "right", "up"),
+        "coordinates": (Coordinate("row", len(grid)), Coordinate("column", len(grid[0]))),
+        "grid": grid,
+        "legend": (f"{AGENT} the agent", *legend),
+    }
+
+
+def _cliff_walking(env: Any, mdp: MDP) -> dict[str, Any]:
+    rows, columns = map(int, env.shape)
+    cliff, step = amount(mdp.rewards.min()), amount(mdp.rewards.max())
+    return {
+        "action_names": ("up", "right", "down", "left"),
+        "coordinates": (Coordinate("row", rows), Coordinate("column", columns)),
+        "grid": (*["." * columns] * (rows - 1), f"S{'C' * (columns - 2)}G"),
+        "legend": (
+            f"{AGENT} the agent",
+            "S start",
+            f"C cliff {cliff}, back to S",
+            "G goal (ends)",
+            f"each step {step}",
+        ),
+    }
+
+
+def _taxi(env: Any, mdp: MDP) -> dict[str, Any]:
+    stands = ("at R", "at G", "at Y", "at B")
+    return {
+        "action_names": ("south", "north", "east", "west", "pickup", "dropoff"),
+        "coordinates": (
+            Coordinate("row", 5),
+            Coordinate("column", 5),
+            Coordinate("passenger", 5, (*stands, "in the taxi")),
+            Coordinate("destination", 4, stands),
+        ),
+        "grid": tuple(b"".join(row).decode() for row in env.desc),
+        "origin": (1, 1),
+        "stride": (1, 2),
+        "legend": (
+            f"{AGENT} the taxi",
+            "| wall, : way through",
+            f"delivery {amount(mdp.rewards.max())} (ends)",
+            f"wrong pickup or dropoff {amount(mdp.rewards.min())}",
+            "each other step -1",
+        ),
+    }
+
+
+_KNOWN: dict[str, Callable[[Any, MDP], dict[str, Any]]] = {
+    "FrozenLakeEnv": _frozen_lake,
+    "CliffWalkingEnv": _cliff_walking,
+    "TaxiEnv": _taxi,
+}
+
+
+def _effect(mdp: MDP, states: list[int]) -> str:
+    """Returns what entering some states pays, where that is always the same, and if it ends."""
+    entered = np.isin(mdp.next_states, states) & (mdp.next_states != mdp.transition_states)
+    pays = np.unique(mdp.rewards[entered])
+    reward = f" {amount(pays[0])}" if len(pays) == 1 and pays[0] else ""
+    return reward + " (ends)" * bool(entered.any() and mdp.terminated[entered].all())

@@ -6,6 +6,7 @@ import typer
 
 from trdlab import __version__
 from trdlab.cli.gridworld import gridworld
+from trdlab.cli.tabular import tabular
 
 app = typer.Typer(
     name="trdlab",
@@ -15,6 +16,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(gridworld)
+app.command()(tabular)
 
 
 def _print_version(wanted: bool) -> None:

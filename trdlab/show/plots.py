@@ -23,6 +23,7 @@ from trdlab.gridworld import Gridworld
 from trdlab.gridworld.gridmap import MOVES
 from trdlab.gridworld.render import draw_map
 from trdlab.show.gridworld import GridworldReport
+from trdlab.show.report import Report, Scene
 from trdlab.tabular import ExactTable
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
@@ -35,6 +36,7 @@ _GAP = 0.6  # between the explicit components and the residual, in bars
 _MOST_LABELS = 12
 _MOST_LETTERS = 70  # beneath one picture
 _MOST_ROUTE_STEPS = 1_000
+_POINT = 1.25 / 330  # a point of a line's height, as a share of the panel's
 
 
 def check_picture(path: Path, *, overwrite: bool = False) -> None:
@@ -46,7 +48,7 @@ def check_picture(path: Path, *, overwrite: bool = False) -> None:
     check_output(path, PICTURE_SUFFIXES, overwrite=overwrite)
 
 
-def save_report(report: GridworldReport, path: Path) -> None:
+def save_report(report: Report, path: Path) -> None:
     """Writes the picture of a report; the ending of `path` says in which format.
 
     Raises:
@@ -56,17 +58,20 @@ def save_report(report: GridworldReport, path: Path) -> None:
     write_whole(path, lambda temporary: figure.savefig(temporary, dpi=160))
 
 
-def report_figure(report: GridworldReport) -> Figure:
+def report_figure(report: Report) -> Figure:
     """Returns the picture of a report: the map with its routes, the bars, the contrast."""
     moment, axis = report.explanation.moment, report.table.time_axis
     action, foil = report.explanation.action, report.explanation.foil
     layout = ConstrainedLayoutEngine(rect=(0.0, 0.04, 1.0, 0.96))  # the foot of the page is free
     figure = Figure(figsize=(11.0, 5.8), layout=layout)
-    figure.suptitle(report.world.grid.title or report.world.grid.name, fontsize=12)
+    figure.suptitle(report.scene.caption, fontsize=12)
     panels: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.35))
     left, right = panels
     map_ax = left.subplots()
-    plot_map(map_ax, report.world, report.table, report.state, action, foil)
+    if isinstance(report, GridworldReport):
+        plot_map(map_ax, report.world, report.table, report.state, action, foil)
+    else:
+        plot_scene(map_ax, report.scene, report.state)
     names = [action] if foil is None else [action, foil]
     axes: list[Axes] = list(
         np.atleast_1d(right.subplots(len(names) + (foil is not None), 1, sharex=True))
@@ -139,6 +144,27 @@ def plot_map(
         title_fontsize=8,
         reverse=True,
     )
+    return ax
+
+
+def plot_scene(ax: Axes, scene: Scene, state: int) -> Axes:
+    """Writes the map of a state as text, with its legend.
+
+    Args:
+        ax: the axes to write on.
+        scene: the world and the state.
+        state: the index of the state.
+
+    Returns:
+        `ax`.
+    """
+    ax.axis("off")
+    lines = scene.drawing.splitlines()
+    size = min(26.0, 280.0 / max([1, *map(len, lines)]))
+    ax.text(0.5, 1.0, scene.drawing, family="monospace", fontsize=size, ha="center", va="top")
+    below = 0.95 - len(lines) * size * _POINT
+    words = [f"state {state}", scene.place, "", *scene.legend]
+    ax.text(0.5, below, "\n".join(words), ha="center", va="top", linespacing=1.4)
     return ax
 
 

@@ -1,0 +1,80 @@
+"""`trdlab tabular`: the exact decomposition of an environment's transition table, explained."""
+
+from typing import Annotated
+
+import typer
+
+from trdlab.cli import common
+from trdlab.cli.common import Ties
+
+
+def _complete(incomplete: str) -> list[str]:
+    from trdlab.tabular.toytext import toy_text_ids
+
+    return [name for name in toy_text_ids() if name.startswith(incomplete)]
+
+
+def tabular(
+    env_id: Annotated[
+        str,
+        typer.Argument(
+            metavar="ENV_ID",
+            help="A Gymnasium environment with a transition table, such as FrozenLake-v1, "
+            "CliffWalking-v1 or Taxi-v4; or MODULE:ENV_ID, to import a module first.",
+            autocompletion=_complete,
+        ),
+    ],
+    gamma: common.Gamma = 0.95,
+    horizon: common.Horizon = 4,
+    width: common.Width = 1,
+    env_arguments: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--env-arg",
+            metavar="KEY=VALUE",
+            help="What to make it with, such as is_slippery=false; can be repeated.",
+        ),
+    ] = None,
+    state: Annotated[
+        str | None,
+        typer.Option(
+            "--state",
+            metavar="NUMBER|COORDINATES",
+            help="The state to explain, such as 6 or 1,2 (row,column; in Taxi also "
+            "passenger,destination, such as 2,0,taxi,G).",
+            show_default="the likeliest start",
+        ),
+    ] = None,
+    action: common.Action = None,
+    foil: common.Foil = None,
+    ties: common.WhoseTies = Ties.LOWEST,
+    plot: common.Plot = None,
+    overwrite: common.Overwrite = False,
+    as_json: common.AsJson = False,
+    verbose: common.Verbose = False,
+) -> None:
+    """Solve an environment exactly and say when each action expects which reward.
+
+    It needs an exact model, the table P that Gymnasium's toy-text environments carry.
+
+    Component 0 is the reward of the action taken now; the last component, the residual, holds all
+    that comes after N*w steps.
+    """
+    from trdlab.show import tabular as show
+
+    common.publish(
+        lambda: show.report(
+            env_id,
+            show.parse_arguments(env_arguments or []),
+            gamma=gamma,
+            horizon=horizon,
+            width=width,
+            state=state,
+            action=action,
+            foil=foil,
+            ties=ties.value,
+        ),
+        plot=plot,
+        overwrite=overwrite,
+        as_json=as_json,
+    )

@@ -141,6 +141,13 @@ def _whole(name: str, value: Any, least: int) -> int:
     return int(value)
 
 
+def _is_frozen(array: Any) -> bool:
+    """Returns whether nobody can write to an array, so that it need not be copied."""
+    if not isinstance(array, np.ndarray) or array.flags.writeable:
+        return False
+    return array.base is None or _is_frozen(array.base)
+
+
 def step_label(offset: int) -> str:
     """Returns an agent step as text: `t`, `t+1`."""
     return "t" if offset == 0 else f"t+{offset}"
@@ -155,7 +162,8 @@ class RewardDecomposition:
     `[T, A, N+1]` an episode, `[S, A, N+1]` a table; without A, state values.
 
     Args:
-        components: `[..., N+1]`, in units of discounted reward; copied, and read-only after.
+        components: `[..., N+1]`, in units of discounted reward. Read-only after; copied, unless
+            nobody could write to it before.
         time_axis: what the last axis means.
 
     Raises:
@@ -172,7 +180,7 @@ class RewardDecomposition:
     time_axis: TimeAxis
 
     def __post_init__(self) -> None:
-        components = np.array(self.components, copy=True)
+        components = np.array(self.components, copy=not _is_frozen(self.components) or None)
         if components.dtype.kind != "f":
             components = components.astype(np.float64)
         expected = self.time_axis.num_components

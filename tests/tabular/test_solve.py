@@ -253,14 +253,16 @@ def test_totals_are_the_limit_of_discounted_values(mdp, seed):
 # ---- limits ------------------------------------------------------------------------------------
 
 
-def test_the_sparse_solver_agrees_with_the_dense_one(monkeypatch):
+@pytest.mark.parametrize("gamma", [0.99, 0.995])  # by sweeps, and by a sparse factorisation
+def test_the_sparse_solvers_agree_with_the_dense_one(monkeypatch, gamma):
     worlds = [Gridworld(load_map("bridge").with_slip(0.2)), Gridworld(load_map("loop"))]
-    dense = [optimal(world.mdp, 0.99) for world in worlds]
+    dense = [optimal(world.mdp, gamma) for world in worlds]
     totals = [undiscounted_totals(w.mdp, s.policy) for w, s in zip(worlds, dense, strict=True)]
-    monkeypatch.setattr(solve, "_DENSE_STATES", 0)
+    monkeypatch.setattr(solve, "SMALL", 0)
     for world, known, total in zip(worlds, dense, totals, strict=True):
-        sparse = optimal(world.mdp, 0.99)
-        np.testing.assert_allclose(sparse.q_values, known.q_values, rtol=1e-12, atol=1e-13)
+        sparse = optimal(world.mdp, gamma)
+        assert (np.abs(sparse.q_values - known.q_values) <= sparse.error_bound).all()
+        np.testing.assert_allclose(sparse.q_values, known.q_values, atol=1e-10)
         np.testing.assert_array_equal(sparse.tied, known.tied)
         np.testing.assert_allclose(undiscounted_totals(world.mdp, known.policy), total, atol=1e-12)
     late = MDP.from_transitions([[[(1.0, 0, 1.0, False), (1e-20, 0, 0.0, True)]]])

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,12 @@ from trdlab.errors import InputError
 
 _Item = TypeVar("_Item")
 _Table = Sequence[_Item] | Mapping[int, _Item]  # by number: a list, or a dict as Gymnasium has it
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+SMALL = 500
+"""States up to which numpy alone is quicker than importing scipy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +150,16 @@ class MDP:
         return np.repeat(rows % self.num_actions, np.diff(self.offsets))
 
     @cached_property
+    def matrix(self) -> "csr_array":
+        """`[S·A, S]`: the continuation as a sparse matrix, which shares its memory."""
+        from scipy.sparse import csr_array
+
+        rows = len(self.offsets) - 1
+        index = np.int32 if max(len(self.next_states), rows) < 2**31 else np.int64
+        columns, pointers = self.next_states.astype(index), self.offsets.astype(index)
+        return csr_array((self.continuation, columns, pointers), (rows, self.num_states))
+
+    @cached_property
     def expected_rewards(self) -> FloatArray:
         """`[S, A]`: E[R | s, a]."""
         return self.per_action(self.probabilities * self.rewards)
@@ -165,7 +181,9 @@ class MDP:
 
     def expect(self, values: FloatArray) -> FloatArray:
         """Returns `[S, A]`: the expected `values [S]` of the next state, 0 once terminated."""
-        return self.per_action(self.continuation * values[self.next_states])
+        if self.num_states <= SMALL:
+            return self.per_action(self.continuation * values[self.next_states])
+        return np.asarray((self.matrix @ values).reshape(self.num_states, self.num_actions))
 
     def per_state(self, per_transition: FloatArray) -> FloatArray:
         """Returns `[S]`: the sums of `per_transition [K]` over all actions of a state."""

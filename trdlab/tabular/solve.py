@@ -8,7 +8,8 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError, TrdlabError
-from trdlab.tabular.mdp import MDP, as_policy
+from trdlab.tabular import sweeps
+from trdlab.tabular.mdp import MDP, SMALL, as_policy
 
 Ties = Literal["lowest", "mixed"]
 
@@ -16,7 +17,9 @@ _UNIT = float(np.finfo(np.float64).eps)
 _UNDERFLOW = float(np.finfo(np.float64).tiny)  # above what underflowing operations lose together
 _LARGEST_VALUE = 1e290  # leaves room for the bounds
 _LONGEST = 1e12  # expected steps, beyond which rounding decides an undiscounted total
-_DENSE_STATES = 500  # up to here a dense solve is done before scipy could be imported
+_MOST_DISCOUNT = 0.99  # up to here sweeps converge sooner than a sparse factorisation is done
+_MOST_FACTORISED = 50_000  # states; beyond, a factorisation does not fit into memory
+_TOLERANCE = 1e-12  # of the largest reward's perpetual value, for models solved by sweeps
 _QUICK_GAIN = 1e-13  # relative
 _MAX_SWEEPS = 2_000
 _MAX_IMPROVEMENTS = 10_000
@@ -51,8 +54,10 @@ class Solution:
         return np.asarray((self.policy * self.q_values).sum(axis=1))
 
 
-def optimal(mdp: MDP, gamma: float, *, ties: Ties = "lowest") -> Solution:
-    """Solves for the optimal values: value-iteration sweeps, then policy iteration to the end.
+def optimal(
+    mdp: MDP, gamma: float, *, ties: Ties = "lowest", tolerance: float | None = None
+) -> Solution:
+    """Solves for the optimal values: policy iteration to the end, or by blocks in large models.
 
     Where optimal actions tie, Q is unique but the future is not. `ties` says whose it is:
     `lowest` takes the tied action with the lowest index, `mixed` all of them evenly.
@@ -61,11 +66,18 @@ def optimal(mdp: MDP, gamma: float, *, ties: Ties = "lowest") -> Solution:
         mdp: the model.
         gamma: the discount factor, in [0, 1).
         ties: how to choose among tied optimal actions.
+        tolerance: the error that is allowed in large models; by default 10⁻¹² of what the
+            largest reward would be worth if it were paid for ever. Small ones are solved to
+            rounding.
 
     Raises:
         InputError: γ is outside [0, 1), or the values are out of reach of double precision.
     """
     _check(mdp, gamma)
+    if _is_large(mdp, gamma):
+        # what ties are allowed to lose at each step adds up to 1 / (1 − γ) times as much
+        asked = None if tolerance is None else 0.1 * tolerance * (1.0 - gamma)
+        return _optimal_by_sweeps(mdp, gamma, ties, asked or _default_tolerance(mdp, gamma))
     actions, _ = improved(mdp, gamma, _greedy_after_sweeps(mdp, gamma))
     best = _surely_improved(mdp, gamma, actions)
     most, least = best.q_values + best.error_bound, best.q_values - best.error_bound
@@ -89,7 +101,11 @@ def evaluate(mdp: MDP, policy: FloatArray, gamma: float) -> Solution:
             out of reach of double precision.
     """
     _check(mdp, gamma)
-    return _evaluated(mdp, gamma, as_policy(policy, mdp))
+    policy = as_policy(policy, mdp)
+    if _is_large(mdp, gamma):
+        start = np.zeros(mdp.num_states)
+        return _evaluated_by_sweeps(mdp, gamma, policy, _default_tolerance(mdp, gamma), start)
+    return _evaluated(mdp, gamma, policy)
 
 
 def undiscounted_totals(mdp: MDP, policy: FloatArray) -> FloatArray:
@@ -120,6 +136,48 @@ def undiscounted_totals(mdp: MDP, policy: FloatArray) -> FloatArray:
             values[active] = np.nan
     follows = np.where(mdp.continuation > 0.0, mdp.continuation * values[mdp.next_states], 0.0)
     return mdp.expected_rewards + mdp.per_action(follows)
+
+
+def _is_large(mdp: MDP, gamma: float) -> bool:
+    if mdp.num_states <= SMALL:
+        return False
+    return gamma <= _MOST_DISCOUNT or mdp.num_states > _MOST_FACTORISED
+
+
+def _default_tolerance(mdp: MDP, gamma: float) -> float:
+    perpetual = max(float(np.abs(mdp.expected_rewards).max()), 1e-300) / (1.0 - gamma)
+    return max(_TOLERANCE, 2.0 * sweeps.least_tolerance(mdp, gamma)) * perpetual
+
+
+def _optimal_by_sweeps(mdp: MDP, gamma: float, ties: Ties, tolerance: float) -> Solution:
+    """Solves a large model: the bound is that of the values, carried over to Q."""
+    values, error = sweeps.optimal_values(mdp, gamma, tolerance)
+    q_values = mdp.expected_rewards + gamma * mdp.expect(values)
+    slack = gamma * error + 4 * _UNIT * np.abs(q_values)
+    near = q_values + slack >= (q_values - slack).max(axis=1, keepdims=True)
+    policy = near / near.sum(axis=1, keepdims=True) if ties == "mixed" else _lowest(near)
+    chosen = _evaluated_by_sweeps(mdp, gamma, policy, tolerance, values)
+    several = (near.sum(axis=1) > 1) & ~mdp.terminal_states
+    return replace(
+        chosen,
+        error_bound=_optimality_bound(chosen),
+        tied=near & several[:, None],
+        is_optimal=True,
+    )
+
+
+def _evaluated_by_sweeps(
+    mdp: MDP, gamma: float, policy: FloatArray, tolerance: float, start: FloatArray
+) -> Solution:
+    values, error = sweeps.policy_values(mdp, policy, gamma, tolerance, start)
+    q_values = mdp.expected_rewards + gamma * mdp.expect(values)
+    return Solution(
+        gamma=gamma,
+        policy=policy,
+        q_values=q_values,
+        error_bound=gamma * error + 4 * _UNIT * np.abs(q_values),
+        tied=np.zeros(q_values.shape, dtype=np.bool_),
+    )
 
 
 def _greedy_after_sweeps(mdp: MDP, gamma: float) -> IntArray:
@@ -284,7 +342,7 @@ def _solve_chain(
     sources, targets, weights = mdp.transition_states[keep], mdp.next_states[keep], chain[keep]
     among = np.ones(size, dtype=np.bool_) if among is None else among
     try:
-        if size <= _DENSE_STATES:
+        if size <= SMALL:
             matrix = np.bincount(sources * size + targets, weights, size * size)
             system = np.eye(size) - matrix.reshape(size, size)
             return np.linalg.solve(system[np.ix_(among, among)], right[among])

@@ -1,6 +1,5 @@
 """Decompositions of every state and action of a model, as an Estimator."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,10 +11,10 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.tabular.mdp import MDP, as_policy
+from trdlab.tabular.series import decompose, steps
 from trdlab.tabular.solve import Solution, Ties, evaluate, optimal
 
-MAX_GIGABYTES = 4.0
-MAX_STEPS = 1_000_000
+_MANY = 50_000  # states from which on ties are said without asking whether they matter
 
 _TIED_POLICIES = {
     "lowest": "the optimal policy",
@@ -83,7 +82,7 @@ class ExactTable:
             for part in (
                 np.moveaxis(self.decomposition.components, -1, 0)
                 if singly
-                else _single_steps(self.mdp, self.solution, self.time_axis)
+                else steps(self.mdp, self.solution, self.time_axis.num_steps)
             ):
                 high = np.where(tied, part, -np.inf).max(axis=1)
                 low = np.where(tied, part, np.inf).min(axis=1)
@@ -92,7 +91,12 @@ class ExactTable:
 
 
 def exact(
-    mdp: MDP, time_axis: TimeAxis, *, policy: FloatArray | None = None, ties: Ties = "lowest"
+    mdp: MDP,
+    time_axis: TimeAxis,
+    *,
+    policy: FloatArray | None = None,
+    ties: Ties = "lowest",
+    dtype: type[np.floating[Any]] = np.float64,
 ) -> ExactTable:
     """Solves a model and decomposes the Q-value of every state and action exactly.
 
@@ -106,6 +110,7 @@ def exact(
         time_axis: γ, N and w.
         policy: `[S, A]`, a policy to evaluate; without one, the optimal policy is solved for.
         ties: whose future is told where optimal actions tie.
+        dtype: the precision in which the table is stored; float32 halves its memory.
 
     Raises:
         InputError: `policy` is no policy of this model, or N is too large for it.
@@ -121,44 +126,9 @@ def exact(
         solution, whose = optimal(mdp, gamma, ties=ties), _TIED_POLICIES[ties]
     else:
         solution, whose = evaluate(mdp, as_policy(policy, mdp), gamma), "the given policy"
-    components = RewardDecomposition(decompose(mdp, solution, time_axis), time_axis)
+    components = RewardDecomposition(decompose(mdp, solution, time_axis, dtype), time_axis)
     table = ExactTable(mdp, solution, components, Future(whose))
-    if ties == "lowest" and table.ambiguous.any():
+    tied = solution.tied.any() if mdp.num_states > _MANY else table.ambiguous.any()
+    if ties == "lowest" and tied:
         return replace(table, future=Future(f"{whose} (of tied actions the first)"))
     return table
-
-
-def decompose(mdp: MDP, solution: Solution, time_axis: TimeAxis) -> FloatArray:
-    """Returns `[S, A, N+1]`: the components of a solved policy's future (see `exact`)."""
-    _check_size(mdp, time_axis)
-    components = np.zeros((mdp.num_states, mdp.num_actions, time_axis.num_components))
-    for step, part in enumerate(_single_steps(mdp, solution, time_axis)):
-        components[..., step // time_axis.width] += part
-    return components
-
-
-def _single_steps(mdp: MDP, solution: Solution, time_axis: TimeAxis) -> Iterator[FloatArray]:
-    """Yields `[S, A]` for each of the N·w steps, the expected discounted reward; then the rest."""
-    gamma, policy = time_axis.gamma, solution.policy
-    step_reward, beyond = mdp.expected_rewards, solution.q_values  # both [S, A]
-    for _ in range(time_axis.num_steps):
-        yield step_reward
-        step_reward = gamma * mdp.expect((policy * step_reward).sum(axis=1))
-        beyond = gamma * mdp.expect((policy * beyond).sum(axis=1))
-        if not step_reward.any() and not beyond.any():
-            return  # all is over, or too far away for a float
-    yield beyond
-
-
-def _check_size(mdp: MDP, axis: TimeAxis) -> None:
-    gigabytes = mdp.num_states * mdp.num_actions * axis.num_components * 8 / 1e9
-    if gigabytes > MAX_GIGABYTES:
-        raise InputError(
-            f"N = {axis.horizon} takes {gigabytes:.3g} GB for {mdp.num_states} states and "
-            f"{mdp.num_actions} actions.",
-            "Choose a smaller N; a larger w reaches as far.",
-        )
-    if axis.num_steps > MAX_STEPS:
-        raise InputError(
-            f"N·w = {axis.num_steps} steps are too many.", f"At most {MAX_STEPS} can be followed."
-        )

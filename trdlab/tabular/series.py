@@ -1,0 +1,121 @@
+"""The future of a policy as a series: the reward of each step, one after another."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.decomposition import TimeAxis
+from trdlab.errors import InputError
+from trdlab.tabular.mdp import MDP, SMALL
+from trdlab.tabular.solve import Solution
+
+MAX_GIGABYTES = 8.0
+MAX_STEPS = 1_000_000
+
+
+def steps(mdp: MDP, solution: Solution, count: int) -> Iterator[FloatArray]:
+    """Yields `[S, A]` for each of `count` steps, its expected discounted reward; then the rest.
+
+    With C = P·(1 − terminated) and x^π(s) = Σ_a π(a|s) x(s, a), these are m_0 = E[R | s, a] and
+    m_i = γ·C·m^π_(i−1); the rest is (γC)^count applied to Q. Each step takes one sparse product for
+    all actions, and one for the policy's alone. Ends early when nothing is left to come.
+    """
+    gamma = solution.gamma
+    average, follow = averaging(solution.policy), following(mdp, solution.policy)
+    reward, value = mdp.expected_rewards, average(solution.q_values)  # [S, A], [S]
+    if count == 0:
+        yield solution.q_values
+    for last in [False] * (count - 1) + [True] * (count > 0):
+        yield reward
+        ahead = gamma * average(reward)  # [S]
+        if not ahead.any() and not value.any():
+            return
+        if last:
+            yield mdp.expect(gamma * value)
+        else:
+            reward, value = mdp.expect(ahead), gamma * follow(value)
+
+
+def components(mdp: MDP, solution: Solution, axis: TimeAxis) -> Iterator[FloatArray]:
+    """Yields the components of every state and action, `[S, A]` each, the residual last.
+
+    This is the way to decompose a model whose whole table does not fit into memory: only a few
+    arrays of S·A numbers are held at a time.
+
+    Raises:
+        InputError: N·w is more than can be followed.
+    """
+    if axis.num_steps > MAX_STEPS:
+        raise InputError(
+            f"N·w = {axis.num_steps} steps are too many.", f"At most {MAX_STEPS} can be followed."
+        )
+    series, nothing = steps(mdp, solution, axis.num_steps), np.zeros_like(solution.q_values)
+    for _ in range(axis.horizon):
+        group = next(series, nothing)
+        for _ in range(axis.width - 1):
+            group = group + next(series, nothing)
+        yield group
+    yield next(series, nothing)
+
+
+def decompose(
+    mdp: MDP, solution: Solution, axis: TimeAxis, dtype: type[np.floating] = np.float64
+) -> FloatArray:
+    """Returns `[S, A, N+1]`, read-only: the components of a solved policy's future.
+
+    Args:
+        mdp: the model.
+        solution: the policy and its values.
+        axis: γ, N and w.
+        dtype: the precision to store them in; they are computed in float64.
+
+    Raises:
+        InputError: the table does not fit into memory, or N·w is more than can be followed.
+    """
+    gigabytes = table_gigabytes(mdp, axis, dtype)
+    if gigabytes > MAX_GIGABYTES:
+        raise InputError(
+            f"N = {axis.horizon} takes {gigabytes:.3g} GB for {mdp.num_states} states and "
+            f"{mdp.num_actions} actions.",
+            "Choose a smaller N (a larger w reaches as far), or stream the components.",
+        )
+    # a component is written at once, so it lies together; the axes are named in another order
+    shape = (axis.num_components, mdp.num_states, mdp.num_actions)
+    table = np.empty(shape, dtype=dtype)
+    for i, component in enumerate(components(mdp, solution, axis)):
+        table[i] = component
+    table.setflags(write=False)
+    return np.moveaxis(table, 0, -1)
+
+
+def table_gigabytes(mdp: MDP, axis: TimeAxis, dtype: type[np.floating] = np.float64) -> float:
+    """Returns the memory that a table of this model takes, in 10⁹ bytes."""
+    entries = mdp.num_states * mdp.num_actions * axis.num_components
+    return entries * np.dtype(dtype).itemsize / 1e9
+
+
+def averaging(policy: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Returns the map from x `[S, A]` to x^π `[S]`, Σ_a π(a|s) x(s, a)."""
+    if np.isin(policy, (0.0, 1.0)).all():  # one action each: no need to add up
+        chosen = np.arange(len(policy)) * policy.shape[1] + policy.argmax(axis=1)
+        return lambda x: np.asarray(x.ravel().take(chosen))
+    return lambda x: np.asarray((policy * x).sum(axis=1))
+
+
+def following(mdp: MDP, policy: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Returns the map from v `[S]` to its expectation `[S]` one step along the policy."""
+    if mdp.num_states <= SMALL:
+        average = averaging(policy)
+        return lambda v: average(mdp.expect(v))
+    if np.isin(policy, (0.0, 1.0)).all():
+        rows = np.arange(mdp.num_states) * mdp.num_actions + policy.argmax(axis=1)
+        chain = mdp.matrix[rows]
+    else:
+        from scipy.sparse import csr_array
+
+        weights = policy[mdp.transition_states, mdp.transition_actions] * mdp.continuation
+        pointers = mdp.offsets[:: mdp.num_actions]
+        shape = (mdp.num_states, mdp.num_states)
+        chain = csr_array((weights, mdp.next_states, pointers), shape)
+    return lambda v: np.asarray(chain @ v)

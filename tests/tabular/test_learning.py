@@ -84,7 +84,9 @@ def test_the_operator_table_is_the_fixed_point(mdp, axis):
 @both_worlds
 def test_without_random_actions_inside_the_windows_there_is_no_bias(mdp):
     for axis, epsilon in ((ONE, 1.0), (TWO, 0.0), (TimeAxis(0.9, 2, 5), 0.0)):
-        assert np.abs(operator_table(mdp, axis, epsilon).bias.components).max() < 1e-12
+        table = operator_table(mdp, axis, epsilon)
+        assert np.abs(table.bias.components).max() < 1e-12
+        assert str(table) == f"w = {axis.width}, ε = {epsilon:g}: no bias."
 
 
 def test_the_bias_of_the_drone():
@@ -364,8 +366,7 @@ def test_a_learned_table_works_wherever_an_exact_one_does():
         ({"width": 2, "epsilon": 0.0}, "the greedy policy"),
         (
             {"width": 3},
-            "a policy that is greedy in every 3. step and in between takes a random action "
-            "with probability 0.1",
+            "a policy that acts greedily once every 3 steps and ε-greedily in between (ε = 0.1)",
         ),
     ],
 )

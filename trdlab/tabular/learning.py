@@ -237,8 +237,8 @@ def _future(is_given: bool, axis: TimeAxis, epsilon: float, tail: Tail, loss: Lo
         policy = "the greedy policy"
     else:
         policy = (
-            f"a policy that is greedy in every {axis.width}. step and in between takes a random "
-            f"action with probability {epsilon:g}"
+            f"a policy that acts greedily once every {axis.width} steps and ε-greedily in between "
+            f"(ε = {epsilon:g})"
         )
     only = "; only the sum is learned, the components mean nothing" if loss == "sum" else ""
     return Future(f"{policy}, learned from samples{only}")

@@ -45,14 +45,17 @@ class OperatorTable:
         return self.decomposition - self.optimal
 
     def __str__(self) -> str:
-        value = self.bias.value  # [S, A]
+        setting, value = f"w = {self.time_axis.width}, ε = {self.epsilon:g}", self.bias.value
+        largest = np.abs(self.bias.components).max()
+        if largest <= _SAME * max(1.0, np.abs(self.optimal.components).max()):
+            return f"{setting}: no bias."
         state, action = np.unravel_index(np.abs(value).argmax(), value.shape)
         learned = self.decomposition.value[state, action]
         best = self.optimal.value[state, action]
         return (
-            f"w = {self.time_axis.width}, ε = {self.epsilon:g}: Q is biased by up to "
+            f"{setting}: Q is biased by up to "
             f"{abs(value[state, action]):.4g} (state {state}, action {action}: {learned:.4f}, "
-            f"optimal {best:.4f}), a component by up to {np.abs(self.bias.components).max():.4g}."
+            f"optimal {best:.4f}), a component by up to {largest:.4g}."
         )
 
 

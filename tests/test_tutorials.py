@@ -11,9 +11,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from trdlab.bellman import target
 from trdlab.decomposition import TimeAxis
 from trdlab.gridworld import Gridworld, load_map, parse_map
-from trdlab.tabular import exact
+from trdlab.tabular import MDP, WindowBuilder, exact, learn
 
 TUTORIALS = Path(__file__).parents[1] / "tutorials"
 LESSONS = sorted(TUTORIALS.glob("[0-9]*.py"))
@@ -26,6 +27,12 @@ SOLUTIONS = {
     "2.1": "target(np.float64(0.5), np.float64(0.5), np.array([1.0, 2.0, 4.0]))",
     "2.2": "TimeAxis(0.95, horizon=30).regrouped(5).num_components",
     "2.3": "0.9",
+    "3.1": "np.array([0, 2, 4]) / 2 + target(1.0, 0.5, np.array([2.0, 2.0, 4.0])) / 2",
+    "3.2": "10",
+    "3.3": "np.std([4, 0, 0, 0])",
+    "4.1": "[2, 1, 1, 1]",
+    "4.2": "[2, 4]",
+    "4.3": "(1 - 0.2 + 0.2 / 4) ** 2",
 }
 
 
@@ -59,7 +66,12 @@ def exercises_of(lesson: Path) -> list[str]:
 
 
 def test_lessons_are_found() -> None:
-    assert [lesson.stem for lesson in LESSONS] == ["01_read_a_reward_vector", "02_derive_it"]
+    assert [lesson.stem for lesson in LESSONS] == [
+        "01_read_a_reward_vector",
+        "02_derive_it",
+        "03_learn_it",
+        "04_why_the_sum_fails",
+    ]
 
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.stem)
@@ -105,6 +117,28 @@ def test_second_lesson_finds_no_deviation(tmp_path: Path) -> None:
     assert "False" not in run(LESSONS[1], tmp_path)
 
 
+def test_third_lesson_learns_what_is_exact(tmp_path: Path) -> None:
+    printed = run(LESSONS[2], tmp_path)
+    for line in (
+        "after flight 5: [0.   0.95 0.9  0.86 0.81]",
+        "up   [0.    0.    0.    0.    3.258]",
+        "largest error anywhere: 0.0",
+    ):
+        assert f"\n{line}\n" in f"\n{printed}"
+
+
+def test_fourth_lesson_says_what_its_numbers_show(tmp_path: Path) -> None:
+    printed = run(LESSONS[3], tmp_path)
+    assert printed.count("sum 3.52\n") == 4  # the exact vector and three wrong ones
+    for line in (
+        "1 step(s) later [0.95  1.76  3.022] sum 5.732",
+        "w = 2, ε = 0: no bias.",
+        "greedy tails    [0.95  1.76  0.815]",
+        "left out: 7.5% of all windows",
+    ):
+        assert f"\n{line}\n" in printed
+
+
 @pytest.mark.parametrize("name", exercise.EXERCISES)
 def test_check_explains_each_known_mistake(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     for wrong, said in exercise.EXERCISES[name].mistakes:
@@ -139,3 +173,32 @@ def test_solution_of_the_corridor_ties_both_sides() -> None:
     gamma = exercise.EXERCISES["2.3"].right
     table = exact(Gridworld(parse_map(text)).mdp, TimeAxis(gamma, 4))
     assert table.solution.tied[0].tolist() == [False, False, True, True]
+
+
+def test_solution_of_the_corridor_counts_the_flights_of_the_news() -> None:
+    vectors, flights = np.zeros((11, 5)), 0
+    while not vectors[0].any():
+        flights += 1
+        for step in range(10):
+            following = vectors[step + 1].copy()
+            vectors[step] = target(float(step == 9), 0.9 * (step < 9), following)
+    assert flights == exercise.EXERCISES["3.2"].right
+
+
+def test_solution_of_the_sum_is_where_such_a_learner_ends() -> None:
+    five = MDP.from_transitions([[[(1.0, 0, 5.0, True)]]])
+    begin = np.array([[[1.0, 0.0, 0.0, 0.0]]])
+    learned = learn(five, TimeAxis(0.9, 3), loss="sum", initial=begin, agent_steps=500_000)
+    ends = learned.decomposition.components[0, 0]
+    np.testing.assert_allclose(ends, exercise.EXERCISES["4.1"].right, atol=1e-3)
+
+
+def test_solution_of_the_windows_is_what_the_builder_finds() -> None:
+    found = []
+    for ending in ("truncated", "terminated"):
+        builder, count = WindowBuilder(3, 0.9, 1), 0
+        for step in range(4):
+            ends = [[step == 3 and ending == kind] for kind in ("terminated", "truncated")]
+            count += len(builder.add([step], [0], [1.0], *ends, [step + 1]))
+        found.append(count)
+    assert found == exercise.EXERCISES["4.2"].right

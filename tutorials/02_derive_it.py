@@ -351,4 +351,5 @@ check("2.3", answer_3)
 # - Q is unique. A decomposition belongs to a policy.
 #
 # Where the paper's own formulas differ from the ones here, and why, is told on the page
-# [Errata and deviations](../errata.md).
+# [Errata and deviations](../errata.md). What to do where nobody tells you the rules of the world,
+# you find in [lesson 3](03_learn_it.md).

@@ -116,6 +116,106 @@ EXERCISES = {
             (20 / 18, "That is above 1. Turn it over."),
         ),
     ),
+    "3.1": Exercise(
+        right=[0.5, 1.5, 3.5],
+        hint="First the target, by the law. Then go half the way from the old entry to it.",
+        mistakes=(
+            ([1, 1, 3], "That is the target. Go only half the way to it."),
+            (
+                [1, 2, 4],
+                "Was n taken for the target? Apply the law first: r in front, fold the last two.",
+            ),
+            (
+                [0.5, 1.5, 2.5],
+                "The last two entries of γ·n were not folded together.",
+            ),
+            (
+                [0.5, 2, 5],
+                "The next components were not discounted.",
+            ),
+        ),
+    ),
+    "3.2": Exercise(
+        right=10,
+        hint="On the first flight only the tenth step learns anything. Which one on the second?",
+        mistakes=(
+            (9, "After nine flights the news has come to the second step."),
+            (
+                5,
+                "N does not stop the news: past the horizon the residual carries it on.",
+            ),
+            (1, "On the first flight only the last step learns anything."),
+        ),
+    ),
+    "3.3": Exercise(
+        right=(0.25 * 4**2 - 1) ** 0.5,
+        hint="Average the squared distances from 1: one is (4 − 1)², the other (0 − 1)².",
+        mistakes=(
+            (3, "That is the variance. The spread is its square root."),
+            (1, "That is the component: the average, not the distance from it."),
+            (2, "Take the distances from the average, which is 1, and not from 0."),
+            (
+                1.5,
+                "That is the mean distance. The spread averages the squares.",
+            ),
+        ),
+    ),
+    "4.1": Exercise(
+        right=[2, 1, 1, 1],
+        hint="The sum is 4 short. Each component is given the same share of that.",
+        mistakes=(
+            (
+                [5, 0, 0, 0],
+                "The loss does not know which component was right. It moves all of them.",
+            ),
+            (
+                [1.25, 1.25, 1.25, 1.25],
+                "That is where it ends from all zeros. This one begins elsewhere.",
+            ),
+            (
+                [5, 4, 4, 4],
+                "4 is missing from the sum, not from each component.",
+            ),
+        ),
+    ),
+    "4.2": Exercise(
+        right=[2, 4],
+        hint="Write down, for each of the four steps, whether three steps follow from it on.",
+        mistakes=(
+            (
+                [4, 2],
+                "The other way round: a short window is exact where nothing follows.",
+            ),
+            (
+                [2, 2],
+                "After a termination zeros follow, and a short window is exact.",
+            ),
+            ([4, 4], "After a truncation nobody knows what would have followed."),
+            (
+                [1, 4],
+                "The window of steps 2, 3, 4 is full: its last state is known, cut off or not.",
+            ),
+        ),
+    ),
+    "4.3": Exercise(
+        right=0.85**2,
+        hint="A random action is the greedy one by accident, once in four. A tail has two actions.",
+        mistakes=(
+            (
+                0.85,
+                "That is one action. The tail of a window of three steps has two.",
+            ),
+            (0.8**2, "A random action may happen to be the greedy one."),
+            (
+                0.85**3,
+                "The first action may be anything: only the tail must be greedy.",
+            ),
+            (
+                0.8**3,
+                "Only the tail must be greedy, and a random action may happen to be.",
+            ),
+        ),
+    ),
 }
 
 

@@ -67,6 +67,19 @@ def plain(value: float) -> str:
     return f"{value:.12g}"
 
 
+def percent(share: float) -> str:
+    """Returns a share in percent; what is neither nothing nor all does not look like it.
+
+    >>> percent(0.231), percent(0.998), percent(1.0)
+    ('23', '99.8', '100')
+    """
+    for decimals in range(5):
+        text = f"{100 * share:.{decimals}f}"
+        if share in (0.0, 1.0) or float(text) not in (0.0, 100.0):
+            break
+    return text
+
+
 def significant(value: float, digits: int = 5) -> str:
     """Returns a number with a fixed count of significant digits, trailing zeros kept.
 

@@ -3,13 +3,14 @@
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Finding
 from trdlab.explain.flips import find_flips
-from trdlab.explain.moment import Moment, WhatIf
+from trdlab.explain.moment import Moment, Uncertainty, WhatIf
 from trdlab.explain.tabular import gridworld_moment, tabular_moment
 
 __all__ = [
     "Explanation",
     "Finding",
     "Moment",
+    "Uncertainty",
     "WhatIf",
     "explain",
     "find_flips",

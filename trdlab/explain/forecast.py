@@ -22,6 +22,10 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
     Raises:
         InputError: there is no such action.
     """
+    return _when(moment, action) + _chances(moment, action)
+
+
+def _when(moment: Moment, action: str) -> tuple[Finding, ...]:
     axis, row = moment.time_axis, moment.components(action)
     explicit, value = row[:-1], float(row.sum())
     if not row.any():
@@ -48,6 +52,30 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
             findings.append(CentreOfMass(action, float(centre)))
     if one_sign(row) and row[-1] != 0.0:
         findings.append(ShareBeyond(action, float(row[-1] / value), axis.horizon))
+    return tuple(findings)
+
+
+def _chances(moment: Moment, action: str) -> tuple[Finding, ...]:
+    """Returns what is uncertain about an action: all of it, one step, and how long it lasts."""
+    known, a = moment.uncertainty, moment.index(action)
+    if known is None:
+        return ()
+    findings: list[Finding] = []
+    deviation = float(known.return_deviation[a])
+    if deviation > 0.0:
+        findings.append(GiveOrTake(action, moment.q_value(action), deviation))
+    either = [
+        EitherOr(action, i, reward, chance)
+        for i, step in enumerate(known.outcomes[a] if known.outcomes else ())
+        for reward, chance in step.items()
+        if set(step) == {0.0, reward} and reward != 0.0
+    ]
+    if either:
+        findings.append(max(either, key=lambda x: abs(x.reward) * x.chance))
+    over = np.flatnonzero(known.survival[a] < 0.5)
+    if over.size:
+        i = int(over[0])
+        findings.append(LikelyOver(action, i, 1.0 - float(known.survival[a, i])))
     return tuple(findings)
 
 
@@ -169,3 +197,67 @@ class CentreOfMass(Finding):
         if moment.time_axis.width != 1 or not one_sign(explicit):
             return False
         return agrees(self.step, float(explicit @ np.arange(len(explicit)) / explicit.sum()))
+
+
+@dataclass(frozen=True)
+class GiveOrTake(Finding):
+    """The standard deviation of an action's whole discounted reward."""
+
+    action: str
+    value: float
+    deviation: float
+
+    def holds(self, moment: Moment) -> bool:
+        if moment.uncertainty is None:
+            return False
+        deviation = float(moment.uncertainty.return_deviation[moment.index(self.action)])
+        value = moment.q_value(self.action)
+        return deviation > 0.0 and agrees(self.value, value) and agrees(self.deviation, deviation)
+
+
+@dataclass(frozen=True)
+class EitherOr(Finding):
+    """A step that pays one amount or nothing; of several, where most of it is expected."""
+
+    action: str
+    component: int
+    reward: float
+    chance: float
+
+    def holds(self, moment: Moment) -> bool:
+        known, a = moment.uncertainty, moment.index(self.action)
+        if known is None or not known.outcomes or self.component >= len(known.outcomes[a]):
+            return False
+        expected = [
+            sum(abs(r) * p for r, p in step.items()) if len(step) == 2 and 0.0 in step else -1.0
+            for step in known.outcomes[a]
+        ]
+        step = known.outcomes[a][self.component]
+        (reward, chance), *_ = [*((r, p) for r, p in step.items() if r != 0.0), (0.0, 0.0)]
+        return (
+            expected.index(max(expected)) == self.component
+            and expected[self.component] > 0.0
+            and agrees(self.reward, reward)
+            and agrees(self.chance, chance)
+        )
+
+
+@dataclass(frozen=True)
+class LikelyOver(Finding):
+    """The first component at whose beginning the episode has more likely ended than not."""
+
+    action: str
+    component: int
+    chance: float
+
+    def holds(self, moment: Moment) -> bool:
+        if moment.uncertainty is None:
+            return False
+        survival = moment.uncertainty.survival[moment.index(self.action)]
+        i = self.component
+        return (
+            i < len(survival)
+            and bool(survival[i] < 0.5)
+            and not (survival[:i] < 0.5).any()
+            and agrees(self.chance, 1.0 - float(survival[i]))
+        )

@@ -41,6 +41,24 @@ class WhatIf:
 
 
 @dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """What is known of a moment beyond its means.
+
+    Args:
+        deviation: `[A, N+1]`, the standard deviation of each component.
+        return_deviation: `[A]`, that of all of an action's discounted reward.
+        survival: `[A, N+1]`, the probability that the episode still runs when a component begins.
+        outcomes: for each action and each explicit step, the probability of each reward; empty
+            for w > 1.
+    """
+
+    deviation: FloatArray
+    return_deviation: FloatArray
+    survival: FloatArray
+    outcomes: tuple[tuple[dict[float, float], ...], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Moment:
     """What an agent expects of each action, here and now.
 
@@ -55,6 +73,7 @@ class Moment:
         tied: the names of the optimal actions here, if several tie and their futures differ.
         tied_later: the number of later states where that is so.
         what_ifs: the quantities that can be varied, where there is a model to solve again.
+        uncertainty: spread and survival, where they are known.
     """
 
     decomposition: RewardDecomposition
@@ -66,6 +85,7 @@ class Moment:
     tied: tuple[str, ...] = ()
     tied_later: int = 0
     what_ifs: tuple[WhatIf, ...] = ()
+    uncertainty: Uncertainty | None = None
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):

@@ -5,11 +5,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.explain.moment import Moment, WhatIf
+from trdlab.explain.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
+from trdlab.tabular.spread import outcomes, spread
 
 GAMMA_RANGE = (0.01, 0.99)
+MAX_SPREAD = 10_000_000  # states times steps, beyond which spread is not worked out
 MAX_WHAT_IF_STATES = 2_000  # each quantity takes a hundred solves
 REWARD_RANGE = 10.0
 """How many times its present value a source of reward is varied up to, from zero on."""
@@ -39,6 +41,24 @@ def tabular_moment(
         tied=tuple(name for name, is_tied in tied if is_tied),
         tied_later=int((table.ambiguous & _later(table, state)).sum()) - here,
         what_ifs=tuple(what_ifs),
+        uncertainty=_uncertainty(table, state),
+    )
+
+
+def _uncertainty(table: ExactTable, state: int) -> Uncertainty | None:
+    """Returns spread and survival at a state, in models that are small enough to ask for them."""
+    mdp, axis, policy = table.mdp, table.time_axis, table.solution.policy
+    if mdp.num_states * axis.num_steps > MAX_SPREAD:
+        return None
+    known = spread(table)
+    steps = axis.num_steps if axis.width == 1 else 0
+    return Uncertainty(
+        deviation=known.deviation[state],
+        return_deviation=np.sqrt(known.return_variance[state]),
+        survival=known.survival[state],
+        outcomes=tuple(
+            tuple(outcomes(mdp, policy, state, action, steps)) for action in range(mdp.num_actions)
+        ),
     )
 
 

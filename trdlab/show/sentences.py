@@ -10,12 +10,12 @@ from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
 
-from trdlab.decomposition import step_label
+from trdlab.decomposition import TimeAxis, step_label
 from trdlab.errors import TrdlabError
 from trdlab.explain import contrast, explanation, flips, forecast
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.finding import Finding, Shown
-from trdlab.formatting import amount, decimals_between, number, plain, significant
+from trdlab.formatting import amount, decimals_between, number, percent, plain, significant
 
 TEMPLATES: dict[type[Finding], str] = {
     contrast.EqualTotals: "Both routes pay {total:amount} in total.",
@@ -84,6 +84,17 @@ TEMPLATES: dict[type[Finding], str] = {
     ),
     forecast.CentreOfMass: "The rewards of {action} before the residual centre on t+{step:value}.",
     forecast.ShareBeyond: "{share:percent} of the value of {action} lies at {component:label}.",
+    forecast.GiveOrTake: (
+        "All in all {action} is worth {value:value}, give or take {deviation:value} (one standard "
+        "deviation)."
+    ),
+    forecast.EitherOr: (
+        "At {component:label} {action} pays either {reward:amount} or nothing: {chance:percent} to "
+        "get it."
+    ),
+    forecast.LikelyOver: (
+        "After {action} the episode is likely over by {component:begin}: {chance:percent}."
+    ),
     explanation.WhoseFuture: "After the first action it is the future of {policy}.",
     explanation.TiedActions: (
         "Here {actions:names} tie: their values are equal, their futures are not."
@@ -171,12 +182,15 @@ class _Style:
     explanation: Explanation
     decimals: int = 2
 
+    @property
+    def axis(self) -> TimeAxis:
+        return self.explanation.moment.time_axis
+
     def label(self, component: int) -> str:
-        return self.explanation.moment.time_axis.label(component)
+        return self.axis.label(component)
 
     def component(self, label: str) -> int | None:
-        labels = self.explanation.moment.time_axis.labels
-        return labels.index(label) if label in labels else None
+        return self.axis.labels.index(label) if label in self.axis.labels else None
 
 
 @dataclass(frozen=True)
@@ -218,6 +232,11 @@ def _decimals(text: str) -> int:
     return 3 if "e" in text else len(text.partition(".")[2]) or 2
 
 
+def _component_that_begins(step: int, axis: TimeAxis) -> int | None:
+    component, within = divmod(step, axis.width)
+    return component if not within and component < axis.num_components else None
+
+
 def _read_labels(text: str, style: _Style) -> tuple[int, ...] | None:
     components = [style.component(label) for label in _split(text)]
     return None if None in components else tuple(c for c in components if c is not None)
@@ -238,9 +257,14 @@ _FORMS = {
     "step": _Form(lambda x, _: step_label(x), r"t(?:\+\d+)?", lambda t, _: int(t[2:] or 0)),
     "count": _Form(lambda x, _: str(x), r"\d+", lambda t, _: int(t)),
     "percent": _Form(
-        lambda x, _: f"{100 * x:.0f} %",
-        r"\d+ %",
-        lambda t, _: Shown(t.removesuffix(" %"), lambda x: f"{100 * x:.0f}"),
+        lambda x, _: f"{percent(x)} %",
+        r"\d+(?:\.\d+)? %",
+        lambda t, _: Shown(t.removesuffix(" %"), percent),
+    ),
+    "begin": _Form(
+        lambda x, style: step_label(style.axis.start(x)),
+        r"t(?:\+\d+)?",
+        lambda t, style: _component_that_begins(int(t[2:] or 0), style.axis),
     ),
     "roots": _Form(
         lambda x, _: _joined([significant(root) for root in x]),

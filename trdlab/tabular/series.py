@@ -12,6 +12,7 @@ from trdlab.tabular.solve import Solution
 
 MAX_GIGABYTES = 8.0
 MAX_STEPS = 1_000_000
+_LOOK = 16  # steps between two looks at whether anything is left to come
 
 
 def steps(mdp: MDP, solution: Solution, count: int) -> Iterator[FloatArray]:
@@ -26,15 +27,15 @@ def steps(mdp: MDP, solution: Solution, count: int) -> Iterator[FloatArray]:
     reward, value = mdp.expected_rewards, average(solution.q_values)  # [S, A], [S]
     if count == 0:
         yield solution.q_values
-    for last in [False] * (count - 1) + [True] * (count > 0):
+    for step in range(1, count + 1):
         yield reward
         ahead = gamma * average(reward)  # [S]
-        if not ahead.any() and not value.any():
+        if step % _LOOK == 0 and not ahead.any() and not value.any():
             return
-        if last:
-            yield mdp.expect(gamma * value)
-        else:
+        if step < count:
             reward, value = mdp.expect(ahead), gamma * follow(value)
+        else:
+            yield mdp.expect(gamma * value)
 
 
 def components(mdp: MDP, solution: Solution, axis: TimeAxis) -> Iterator[FloatArray]:

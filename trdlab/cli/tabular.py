@@ -55,10 +55,10 @@ def tabular(
 ) -> None:
     """Solve an environment exactly and say when each action expects which reward.
 
-    It needs an exact model, the table P that Gymnasium's toy-text environments carry.
+    It needs an exact model: the table P that toy-text environments carry.
 
-    Component 0 is the reward of the action taken now; the last component, the residual, holds all
-    that comes after N*w steps.
+    Component 0 is the reward of the action taken now; the last component,
+    the residual, holds all that comes after N*w steps.
     """
     from trdlab.show import tabular as show
 

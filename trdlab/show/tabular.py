@@ -16,7 +16,8 @@ from trdlab.explain.moment import Moment, WhatIf
 from trdlab.explain.tabular import GAMMA_RANGE, MAX_WHAT_IF_STATES, tabular_moment
 from trdlab.formatting import plain
 from trdlab.show.report import Report, Scene
-from trdlab.tabular import ExactTable, Ties, exact, improved
+from trdlab.tabular import ExactTable, Ties, exact, improved, optimal
+from trdlab.tabular.models import part_after
 from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.toytext import make_world, say_arguments
 
@@ -110,14 +111,14 @@ def _other(moment: Moment, action: str | None) -> str | None:
 
 
 def _what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
-    """Returns γ as a quantity that can be varied, in models small enough to solve often."""
-    mdp, gamma = table.mdp, table.time_axis.gamma
-    if mdp.num_states > MAX_WHAT_IF_STATES:
+    """Returns γ as a quantity that can be varied, where few enough states can follow."""
+    gamma, part = table.time_axis.gamma, part_after(table.mdp, state)
+    if part.num_states > MAX_WHAT_IF_STATES:
         return []
-    actions = table.solution.policy.argmax(axis=1)  # each solve begins with these
+    actions = optimal(part, gamma).policy.argmax(axis=1)  # each solve begins with these
 
     def q_values(value: float) -> FloatArray:
-        return np.asarray(improved(mdp, value, actions)[1][state])
+        return np.asarray(improved(part, value, actions)[1][part.start])
 
     low, high = min(GAMMA_RANGE[0], gamma), max(GAMMA_RANGE[1], gamma)
     return [WhatIf("γ", gamma, low, high, q_values)]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trdlab.arrays import FloatArray, IntArray
+from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.errors import InputError
 from trdlab.tabular.mdp import MDP
 
@@ -58,6 +58,45 @@ def from_arrays(transitions: Any, rewards: Any, terminated: Any = None, *, start
         terminated=np.zeros(len(rows), dtype=np.bool_) if ends is None else ends,
         num_actions=shape[1],
         start=start,
+    )
+
+
+def reachable(mdp: MDP, starts: BoolArray) -> BoolArray:
+    """Returns `[S]`: the states in which an episode can be that began in one of `starts [S]`.
+
+    A state in which it is over does not count.
+    """
+    reached, size = starts.copy(), -1
+    goes_on = mdp.continuation > 0.0
+    sources, targets = mdp.transition_states[goes_on], mdp.next_states[goes_on]
+    while reached.sum() != size:
+        size = int(reached.sum())
+        reached[targets[reached[sources]]] = True
+    return reached
+
+
+def part_after(mdp: MDP, state: int) -> MDP:
+    """Returns the model of a state and of what can follow it; in its order, with it as `start`.
+
+    The state's Q-values are the same in it, however much smaller it is.
+
+    >>> move = [[(1.0, 2, 1.0, False)]], [[(1.0, 0, 5.0, False)]], [[(1.0, 1, 2.0, True)]]
+    >>> part = part_after(MDP.from_transitions(move), 0)
+    >>> part.num_states, part.start, part.rewards.tolist()
+    (2, 0, [1.0, 2.0])
+    """
+    kept = reachable(mdp, np.arange(mdp.num_states) == state)
+    transitions, index = kept[mdp.transition_states], np.cumsum(kept) - 1
+    following = mdp.next_states[transitions]
+    lengths = np.diff(mdp.offsets)[np.repeat(kept, mdp.num_actions)]
+    return MDP(
+        offsets=np.concatenate(([0], np.cumsum(lengths))),
+        next_states=np.where(kept[following], index[following], index[state]),  # else it is over
+        probabilities=mdp.probabilities[transitions],
+        rewards=mdp.rewards[transitions],
+        terminated=mdp.terminated[transitions],
+        num_actions=mdp.num_actions,
+        start=int(index[state]),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.errors import InputError
 from trdlab.tabular.mdp import MDP
+from trdlab.tabular.models import reachable
 
 AGENT = "@"
 
@@ -130,13 +131,6 @@ class TabularWorld:
     @cached_property
     def visited(self) -> BoolArray:
         """`[S]`: the states in which an episode can be that is not over."""
-        mdp, size = self.mdp, 0
-        starts = np.zeros(mdp.num_states) if self.starts is None else self.starts
-        reached = starts > 0.0
-        reached[mdp.start] = True
-        goes_on = mdp.continuation > 0.0
-        sources, targets = mdp.transition_states[goes_on], mdp.next_states[goes_on]
-        while reached.sum() != size:
-            size = int(reached.sum())
-            reached[targets[reached[sources]]] = True
-        return reached
+        starts = np.zeros(self.mdp.num_states) if self.starts is None else self.starts
+        begin = np.arange(self.mdp.num_states) == self.mdp.start
+        return reachable(self.mdp, (starts > 0.0) | begin)

@@ -2,7 +2,7 @@
 
 import inspect
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
@@ -93,8 +93,9 @@ def make_world(env_id: str, arguments: Mapping[str, Any] | None = None) -> Tabul
         ) from error
     except (TypeError, ValueError, LookupError, AssertionError, AttributeError) as error:
         made = f" with {say_arguments(given)}" if given else ""
+        reason = str(error).partition(" was raised from the environment creator")[0]
         raise InputError(
-            f"{env_id} cannot be made{made} ({type(error).__name__}: {error}).",
+            f"{env_id} cannot be made{made} ({type(error).__name__}: {reason}).",
             "Its documentation says what each argument takes.",
         ) from error
     world = tabular_world(env)
@@ -122,17 +123,19 @@ def say_arguments(arguments: Mapping[str, Any]) -> str:
     )
 
 
-def _check_arguments(env_id: str, creator: Any, given: Iterable[str]) -> None:
+def _check_arguments(env_id: str, creator: Any, given: Mapping[str, Any]) -> None:
     from gymnasium.envs.registration import load_env_creator
 
     function = load_env_creator(creator) if isinstance(creator, str) else creator
     parameters = inspect.signature(function).parameters
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
         return
-    for name in given:
+    for name, value in given.items():
         if name not in parameters:
             names = [known for known in parameters if known != "render_mode"]
             raise InputError(f"{env_id} takes no argument '{name}'.", closest(name, names))
+        if isinstance(parameters[name].default, bool) and not isinstance(value, bool):
+            raise InputError(f"The argument {name} is '{value}'.", "It must be true or false.")
 
 
 def _defaults(kind: type) -> dict[str, Any]:

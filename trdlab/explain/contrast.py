@@ -108,7 +108,7 @@ def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     return (Reasons(better, worse, tuple(sorted(chosen)), advantage, against),)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class EqualTotals(Finding):
     """Both actions pay the same in total, undiscounted."""
 
@@ -121,7 +121,7 @@ class EqualTotals(Finding):
         return _close(a, b) and agrees(self.total, a)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class DifferentTotals(Finding):
     """One action pays more in total, undiscounted."""
 
@@ -137,7 +137,7 @@ class DifferentTotals(Finding):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class NoTotal(Finding):
     """An action has no undiscounted total: its rewards never end."""
 
@@ -147,7 +147,7 @@ class NoTotal(Finding):
         return moment.totals is not None and bool(np.isnan(moment.total(self.action)))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class SameComponents(Finding):
     """Both actions have the same decomposition."""
 
@@ -158,7 +158,7 @@ class SameComponents(Finding):
         return not difference(moment, self.action, self.foil).any()
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class MoreImmediate(Finding):
     """One action's running total leads from the first difference on, furthest at `last_step`."""
 
@@ -194,7 +194,7 @@ class MoreImmediate(Finding):
         return (self.last_step + 1) // moment.time_axis.width
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class LessCostly(MoreImmediate):
     """The same where the leader only loses less."""
 
@@ -202,7 +202,7 @@ class LessCostly(MoreImmediate):
         return self._leads(moment) and self._leader_total(moment) <= 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Better(Finding):
     """One action has the larger Q-value."""
 
@@ -223,7 +223,7 @@ class Better(Finding):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class BetterByDiscount(Better):
     """The same where the undiscounted totals are equal: only the discount decides."""
 
@@ -231,7 +231,7 @@ class BetterByDiscount(Better):
         return _close(moment.total(self.better), moment.total(self.worse)) and super().holds(moment)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class EqualValues(Finding):
     """Both actions have the same Q-value."""
 
@@ -245,7 +245,7 @@ class EqualValues(Finding):
         return same(a, b) and agrees(self.value, a) and agrees(self.gamma, moment.time_axis.gamma)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Overtakes(Finding):
     """The running total of one action passes the other's at a component."""
 
@@ -269,7 +269,7 @@ class Overtakes(Finding):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class StaysAhead(Finding):
     """The running total of one action is never behind, and ahead in the end."""
 
@@ -281,7 +281,7 @@ class StaysAhead(Finding):
         return len(lead) > 1 and bool((lead >= 0).all()) and bool(lead[-1] > 0)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Dominates(Finding):
     """One action is at least as good in every component, and better in some."""
 
@@ -293,7 +293,7 @@ class Dominates(Finding):
         return len(delta) > 1 and bool((delta >= 0).all()) and bool((delta > 0).any())
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Reasons(Finding):
     """The fewest components whose advantage outweighs all that speaks for the worse action.
 

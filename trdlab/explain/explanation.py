@@ -64,7 +64,7 @@ def explain(moment: Moment, action: str | None = None, foil: str | None = None) 
     )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class WhoseFuture(Finding):
     """Who acts after the first action."""
 
@@ -74,7 +74,7 @@ class WhoseFuture(Finding):
         return self.policy == moment.future.policy
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class TiedActions(Finding):
     """Several optimal actions tie here, and their futures differ."""
 
@@ -84,7 +84,7 @@ class TiedActions(Finding):
         return len(self.actions) > 1 and self.actions == moment.tied
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class TiedLater(Finding):
     """Optimal actions tie in later states, and their futures differ."""
 

@@ -6,7 +6,7 @@ that found it. The numbers it compares may be exact, or `Shown`: read back from 
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import FrozenInstanceError, dataclass
 from typing import Any, ClassVar
 
 from trdlab.arrays import FloatArray
@@ -33,14 +33,33 @@ def agrees(claimed: float, true: float) -> bool:
     return same(claimed, true) or abs(claimed - true) <= 1e-9 * max(1.0, abs(true))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Finding:
-    """Base class: a claim and its numbers."""
+    """Base class: a claim and its numbers, which cannot be changed once they are set.
+
+    That, equality and the repr are written here once: dataclass would generate them anew for each
+    of some thirty claims, which takes longer than all that a claim is used for.
+    """
 
     kinds: ClassVar[dict[str, type["Finding"]]] = {}
 
     def __init_subclass__(cls) -> None:
         cls.kinds[cls.kind()] = cls
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in self.__dict__:
+            raise FrozenInstanceError(f"the {name} of a finding cannot be changed")
+        super().__setattr__(name, value)
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        return hash((type(self), *self.__dict__.values()))
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items())
+        return f"{type(self).__name__}({values})"
 
     @classmethod
     def kind(cls) -> str:
@@ -53,7 +72,7 @@ class Finding:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the kind and the numbers as plain data."""
-        return {"kind": self.kind()} | {f.name: getattr(self, f.name) for f in fields(self)}
+        return {"kind": self.kind()} | self.__dict__
 
 
 def one_sign(row: FloatArray) -> bool:

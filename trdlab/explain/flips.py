@@ -115,7 +115,7 @@ def _root(gap: Gap, low: float, high: float, at_low: float, at_high: float) -> f
     return root
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Flips(Finding):
     """The values of one quantity at which the preference between two actions flips."""
 
@@ -142,7 +142,7 @@ class Flips(Finding):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class NeverFlips(Finding):
     """The preference stays the same over all values of one quantity."""
 

@@ -79,7 +79,7 @@ def _chances(moment: Moment, action: str) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class EarnsNothing(Finding):
     """No component of an action differs from zero."""
 
@@ -89,7 +89,7 @@ class EarnsNothing(Finding):
         return not moment.components(self.action).any()
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class AllBeyond(Finding):
     """All of an action's value lies in the residual."""
 
@@ -103,7 +103,7 @@ class AllBeyond(Finding):
         return at_end and not row[:-1].any() and row[-1] != 0.0 and agrees(self.value, row[-1])
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class FirstReward(Finding):
     """The first component of an action that is not zero, where it is positive."""
 
@@ -119,14 +119,14 @@ class FirstReward(Finding):
         return is_first and bool(row[i] * self.sign > 0.0) and agrees(self.discounted, row[i])
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class FirstCost(FirstReward):
     """The same where that component is negative."""
 
     sign: ClassVar[float] = -1.0
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class FirstStepReward(FirstReward):
     """The same for w = 1, where the discount can be taken out exactly."""
 
@@ -140,14 +140,14 @@ class FirstStepReward(FirstReward):
         return agrees(self.reward, float(true))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class FirstStepCost(FirstStepReward):
     """The same where that reward is negative."""
 
     sign: ClassVar[float] = -1.0
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class Peak(Finding):
     """The largest explicit component (of equals the first), where several are not zero."""
 
@@ -167,7 +167,7 @@ class Peak(Finding):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class ShareBeyond(Finding):
     """The share of an action's value that lies in the residual; components of one sign only."""
 
@@ -185,7 +185,7 @@ class ShareBeyond(Finding):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class CentreOfMass(Finding):
     """The mean step of an action's explicit rewards, weighted by amount; w = 1, one sign."""
 
@@ -199,7 +199,7 @@ class CentreOfMass(Finding):
         return agrees(self.step, float(explicit @ np.arange(len(explicit)) / explicit.sum()))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class GiveOrTake(Finding):
     """The standard deviation of an action's whole discounted reward."""
 
@@ -215,7 +215,7 @@ class GiveOrTake(Finding):
         return deviation > 0.0 and agrees(self.value, value) and agrees(self.deviation, deviation)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class EitherOr(Finding):
     """A step that pays one amount or nothing; of several, where most of it is expected."""
 
@@ -242,7 +242,7 @@ class EitherOr(Finding):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class LikelyOver(Finding):
     """The first component at whose beginning the episode has more likely ended than not."""
 

@@ -8,7 +8,6 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError, TrdlabError
-from trdlab.tabular import sweeps
 from trdlab.tabular.mdp import MDP, SMALL, as_policy
 
 Ties = Literal["lowest", "mixed"]
@@ -145,12 +144,16 @@ def _is_large(mdp: MDP, gamma: float) -> bool:
 
 
 def _default_tolerance(mdp: MDP, gamma: float) -> float:
+    from trdlab.tabular import sweeps
+
     perpetual = max(float(np.abs(mdp.expected_rewards).max()), 1e-300) / (1.0 - gamma)
     return max(_TOLERANCE, 2.0 * sweeps.least_tolerance(mdp, gamma)) * perpetual
 
 
 def _optimal_by_sweeps(mdp: MDP, gamma: float, ties: Ties, tolerance: float) -> Solution:
     """Solves a large model: the bound is that of the values, carried over to Q."""
+    from trdlab.tabular import sweeps
+
     values, error = sweeps.optimal_values(mdp, gamma, tolerance)
     q_values = mdp.expected_rewards + gamma * mdp.expect(values)
     slack = gamma * error + 4 * _UNIT * np.abs(q_values)
@@ -169,6 +172,8 @@ def _optimal_by_sweeps(mdp: MDP, gamma: float, ties: Ties, tolerance: float) -> 
 def _evaluated_by_sweeps(
     mdp: MDP, gamma: float, policy: FloatArray, tolerance: float, start: FloatArray
 ) -> Solution:
+    from trdlab.tabular import sweeps
+
     values, error = sweeps.policy_values(mdp, policy, gamma, tolerance, start)
     q_values = mdp.expected_rewards + gamma * mdp.expect(values)
     return Solution(

@@ -8,14 +8,16 @@ _LARGEST_FIXED = 1e7
 
 
 def decimals_for(values: Iterable[float]) -> int:
-    """Returns the decimals at which a group of numbers is read: two, or more if all are small.
+    """Returns the decimals at which a group of numbers is read: two, or more if many are small.
 
-    >>> decimals_for([0, 0.95, 3.258]), decimals_for([0, 0.0123])
-    (2, 4)
+    >>> decimals_for([0, 0.95, 3.258]), decimals_for([0, 0.0123]), decimals_for([1, 0.003, 0.002])
+    (2, 4, 3)
     """
-    largest = max((abs(v) for v in values if math.isfinite(v)), default=0.0)
+    sizes = [abs(v) for v in values if math.isfinite(v) and v != 0.0]
+    largest = max(sizes, default=0.0)
     if largest == 0.0 or largest >= 0.1:
-        return 2
+        lost = [sum(size < 0.5 * 0.1**decimals for size in sizes) for decimals in (2, 3)]
+        return 2 + sum(4 * count > len(sizes) for count in lost)
     return 2 - math.floor(math.log10(max(largest, _SMALLEST_FIXED)))
 
 

@@ -36,6 +36,8 @@ WORDS = {
     "flips": "stays",
     "No value": "Any value",
     "not": "too",
+    "likely": "hardly",
+    "either": "neither",
 }
 
 

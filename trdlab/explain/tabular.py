@@ -74,15 +74,25 @@ def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
     """
     what_ifs: list[WhatIf] = []
     if table.solution.is_optimal and world.mdp.num_states <= MAX_WHAT_IF_STATES:
-        gamma, mdp = table.time_axis.gamma, world.mdp
-        solver = _Resolved(state, lambda value: (mdp, value))
-        low, high = min(GAMMA_RANGE[0], gamma), max(GAMMA_RANGE[1], gamma)
-        what_ifs.append(WhatIf("γ", gamma, low, high, solver))
+        gamma = table.time_axis.gamma
+        what_ifs.append(gamma_what_if(world.mdp, gamma, state))
         for source in (source for source in world.sources if source.value):
             solver = _Resolved(state, lambda value, s=source: (world.mdp_if(s, value), gamma))  # type: ignore[misc]
             low, high = sorted((0.0, REWARD_RANGE * source.value))
             what_ifs.append(WhatIf(source_name(world, source), source.value, low, high, solver))
     return tabular_moment(table, state, world.action_names, what_ifs)
+
+
+def gamma_what_if(mdp: MDP, gamma: float, state: int) -> WhatIf:
+    """Returns γ as a quantity that can be varied, the optimal policy solved for again each time.
+
+    Args:
+        mdp: the model.
+        gamma: its present discount factor.
+        state: whose Q-values are asked for.
+    """
+    low, high = min(GAMMA_RANGE[0], gamma), max(GAMMA_RANGE[1], gamma)
+    return WhatIf("γ", gamma, low, high, _Resolved(state, lambda value: (mdp, value)))
 
 
 def source_name(world: Gridworld, source: Source) -> str:

@@ -33,6 +33,7 @@ _FOIL = "#e39a2d"  # light; its route is dashed
 _MUTED = "#5b6470"
 _POLICY = "#2f7d4f"
 _GAP = 0.6  # between the explicit components and the residual, in bars
+_MOST_NUMBERS = 9  # written at the bars
 _MOST_LABELS = 12
 _MOST_LETTERS = 70  # beneath one picture
 _MOST_ROUTE_STEPS = 1_000
@@ -78,6 +79,8 @@ def report_figure(report: Report) -> Figure:
     )
     for ax, name, colour in zip(axes, names, (_ACTION, _FOIL), strict=False):
         plot_components(ax, moment.components(name), axis, colour=colour)
+        if moment.uncertainty is not None:
+            plot_uncertainty(ax, moment, name)
         ax.set_title(_title(moment, name), fontsize=10, loc="left")
     if foil is not None:
         plot_contrast(axes[-1], moment, action, foil)
@@ -224,13 +227,12 @@ def plot_components(ax: Axes, components: FloatArray, axis: TimeAxis, *, colour:
     Returns:
         `ax`.
     """
-    positions = np.arange(axis.num_components, dtype=np.float64)
-    positions[-1] += _GAP if axis.horizon else 0.0
+    positions = _positions(axis)
     ax.bar(positions[:-1], components[:-1], color=colour, width=0.8)
     ax.bar(positions[-1:], components[-1:], fc="white", ec=colour, hatch="////", width=0.8)
     ax.axhline(0.0, color="black", linewidth=0.8)
     decimals = decimals_for(components)
-    if axis.num_components <= _MOST_LABELS:
+    if axis.num_components <= _MOST_NUMBERS:
         for x, y in zip(positions, components, strict=True):
             ax.annotate(
                 number(float(y), decimals),
@@ -240,11 +242,45 @@ def plot_components(ax: Axes, components: FloatArray, axis: TimeAxis, *, colour:
                 ha="center",
                 va="bottom" if y >= 0 else "top",
                 fontsize=8,
+                bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.6},
+                zorder=5,
             )
     _label_steps(ax, positions, axis)
     ax.margins(y=0.2)
     ax.spines[["top", "right"]].set_visible(False)
     ax.tick_params(labelsize=8)
+    return ax
+
+
+def plot_uncertainty(ax: Axes, moment: Moment, action: str) -> Axes:
+    """Adds to an action's bars one standard deviation each, and the chance of still being alive.
+
+    Survival is a thin line of steps, read on the right; it is left out where the episode cannot
+    end within the components.
+
+    Args:
+        ax: the axes with the bars.
+        moment: the decompositions, and their uncertainty.
+        action: the name of the action.
+
+    Returns:
+        `ax`.
+    """
+    known, a, positions = moment.uncertainty, moment.index(action), _positions(moment.time_axis)
+    if known is None:
+        return ax
+    means, deviation = moment.components(action), known.deviation[a]
+    shown = deviation > 0.0
+    ax.errorbar(
+        positions[shown], means[shown], deviation[shown], fmt="none", ecolor="black", capsize=2.0
+    )
+    if known.survival[a, -1] < 1.0:
+        right = ax.twinx()
+        right.step(positions, known.survival[a], where="mid", color=_POLICY, linewidth=1.0)
+        right.set(ylim=(0.0, 1.15), yticks=(0.0, 0.5, 1.0))
+        right.set_ylabel("still running", fontsize=8, color=_POLICY)
+        right.tick_params(labelsize=7, colors=_POLICY)
+        right.spines[["top", "left"]].set_visible(False)
     return ax
 
 
@@ -270,6 +306,13 @@ def plot_contrast(ax: Axes, moment: Moment, action: str, foil: str) -> Axes:
     gap = moment.q_value(action) - moment.q_value(foil)
     ax.set_title(f"{action} − {foil}: {_short(gap)} in all", fontsize=10, loc="left")
     return ax
+
+
+def _positions(axis: TimeAxis) -> FloatArray:
+    """Returns where the bars stand: in a row, the residual set apart."""
+    positions = np.arange(axis.num_components, dtype=np.float64)
+    positions[-1] += _GAP if axis.horizon else 0.0
+    return positions
 
 
 def _title(moment: Moment, action: str) -> str:

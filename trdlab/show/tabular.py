@@ -5,18 +5,15 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
-from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.explain.contrast import difference
 from trdlab.explain.explanation import explain
 from trdlab.explain.moment import Moment, WhatIf
-from trdlab.explain.tabular import GAMMA_RANGE, MAX_WHAT_IF_STATES, tabular_moment
+from trdlab.explain.tabular import MAX_WHAT_IF_STATES, gamma_what_if, tabular_moment
 from trdlab.formatting import plain
 from trdlab.show.report import Report, Scene
-from trdlab.tabular import ExactTable, Ties, exact, improved, optimal
+from trdlab.tabular import ExactTable, Ties, exact
 from trdlab.tabular.models import part_after
 from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.toytext import make_world, say_arguments
@@ -115,13 +112,7 @@ def _what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
     gamma, part = table.time_axis.gamma, part_after(table.mdp, state)
     if part.num_states > MAX_WHAT_IF_STATES:
         return []
-    actions = optimal(part, gamma).policy.argmax(axis=1)  # each solve begins with these
-
-    def q_values(value: float) -> FloatArray:
-        return np.asarray(improved(part, value, actions)[1][part.start])
-
-    low, high = min(GAMMA_RANGE[0], gamma), max(GAMMA_RANGE[1], gamma)
-    return [WhatIf("γ", gamma, low, high, q_values)]
+    return [gamma_what_if(part, gamma, part.start)]
 
 
 def _scene(world: TabularWorld, state: int, next_step: str, given: Mapping[str, Any]) -> Scene:

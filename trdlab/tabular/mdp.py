@@ -17,7 +17,7 @@ _Table = Sequence[_Item] | Mapping[int, _Item]  # by number: a list, or a dict a
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-SMALL = 500
+SMALL = 300
 """States up to which numpy alone is quicker than importing scipy."""
 
 

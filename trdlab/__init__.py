@@ -4,15 +4,16 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from trdlab.decomposition import RewardDecomposition, TimeAxis
+    from trdlab.decomposition import RewardDecomposition
     from trdlab.estimator import Estimator, Future
+    from trdlab.time_axis import TimeAxis
 
 __version__ = "0.1.0"
 __all__ = ["Estimator", "Future", "RewardDecomposition", "TimeAxis", "__version__"]
 
 _HOMES = {
     "RewardDecomposition": "trdlab.decomposition",
-    "TimeAxis": "trdlab.decomposition",
+    "TimeAxis": "trdlab.time_axis",
     "Estimator": "trdlab.estimator",
     "Future": "trdlab.estimator",
 }

@@ -13,7 +13,8 @@ from trdlab.estimator import Estimator
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import MDP, exact, learn, operator_table
 from trdlab.tabular.operator import epsilon_greedy
-from trdlab.tabular.worlds import ModelWorlds, reachable
+from trdlab.tabular.reach import reachable
+from trdlab.tabular.worlds import ModelWorlds
 from trdlab.wrappers import TemporalRewardDecomposition
 
 ONE, TWO = TimeAxis(0.95, horizon=4), TimeAxis(0.95, horizon=4, width=2)

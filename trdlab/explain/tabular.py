@@ -8,6 +8,7 @@ from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.explain.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
+from trdlab.tabular.reach import reached
 from trdlab.tabular.spread import outcomes, spread
 
 GAMMA_RANGE = (0.01, 0.99)
@@ -133,9 +134,4 @@ def _later(table: ExactTable, state: int) -> BoolArray:
     followed[state] = True
     edge = (mdp.continuation > 0.0) & followed[mdp.transition_states, mdp.transition_actions]
     sources, targets = mdp.transition_states[edge], mdp.next_states[edge]
-    reached, size = np.zeros(mdp.num_states, dtype=np.bool_), -1
-    reached[state] = True
-    while reached.sum() != size:
-        size = int(reached.sum())
-        reached[targets[reached[sources]]] = True
-    return reached
+    return reached(np.arange(mdp.num_states) == state, sources, targets)

@@ -10,12 +10,12 @@ from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
 
-from trdlab.decomposition import TimeAxis, step_label
 from trdlab.errors import TrdlabError
 from trdlab.explain import contrast, explanation, flips, forecast
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.finding import Finding, Shown
 from trdlab.formatting import amount, decimals_between, number, percent, plain, significant
+from trdlab.time_axis import TimeAxis, step_label
 
 TEMPLATES: dict[type[Finding], str] = {
     contrast.EqualTotals: "Both routes pay {total:amount} in total.",

@@ -3,8 +3,9 @@
 from typing import TYPE_CHECKING
 
 from trdlab.tabular.mdp import MDP
-from trdlab.tabular.solve import Solution, Ties, evaluate, improved, optimal, undiscounted_totals
+from trdlab.tabular.solve import Solution, Ties, evaluate, improved, optimal
 from trdlab.tabular.table import ExactTable, exact
+from trdlab.tabular.totals import undiscounted_totals
 
 if TYPE_CHECKING:
     from trdlab.tabular.environments import from_environment

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from trdlab.arrays import IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.errors import InputError
 from trdlab.estimator import Future
+from trdlab.tabular.table import as_states
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +39,4 @@ class LearnedTable:
         Raises:
             InputError: an observation is not the index of a state.
         """
-        states = np.asarray(observations)
-        if states.dtype.kind not in "iu":
-            raise InputError(
-                f"The observations have type {states.dtype}.", "A table takes state indices."
-            )
-        if states.size and not 0 <= states.min() <= states.max() < len(self.decomposition):
-            raise InputError(
-                f"The observations run from {states.min()} to {states.max()}.",
-                f"States run from 0 to {len(self.decomposition) - 1}.",
-            )
-        return self.decomposition[states]
+        return self.decomposition[as_states(observations, len(self.decomposition))]

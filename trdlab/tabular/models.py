@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.arrays import FloatArray, IntArray
 from trdlab.errors import InputError
 from trdlab.tabular.mdp import MDP
+from trdlab.tabular.reach import reachable
 
 _LAYOUTS = (
     "Give [S, A, S], a scipy sparse matrix [S·A, S] with row s·A + a, or A sparse matrices [S, S]."
@@ -59,20 +60,6 @@ def from_arrays(transitions: Any, rewards: Any, terminated: Any = None, *, start
         num_actions=shape[1],
         start=start,
     )
-
-
-def reachable(mdp: MDP, starts: BoolArray) -> BoolArray:
-    """Returns `[S]`: the states in which an episode can be that began in one of `starts [S]`.
-
-    A state in which it is over does not count.
-    """
-    reached, size = starts.copy(), -1
-    goes_on = mdp.continuation > 0.0
-    sources, targets = mdp.transition_states[goes_on], mdp.next_states[goes_on]
-    while reached.sum() != size:
-        size = int(reached.sum())
-        reached[targets[reached[sources]]] = True
-    return reached
 
 
 def part_after(mdp: MDP, state: int) -> MDP:

@@ -10,7 +10,7 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.errors import InputError
 from trdlab.tabular.mdp import MDP
-from trdlab.tabular.models import reachable
+from trdlab.tabular.reach import reachable
 
 AGENT = "@"
 

@@ -15,7 +15,6 @@ Ties = Literal["lowest", "mixed"]
 _UNIT = float(np.finfo(np.float64).eps)
 _UNDERFLOW = float(np.finfo(np.float64).tiny)  # above what underflowing operations lose together
 _LARGEST_VALUE = 1e290  # leaves room for the bounds
-_LONGEST = 1e12  # expected steps, beyond which rounding decides an undiscounted total
 _MOST_DISCOUNT = 0.99  # up to here sweeps converge sooner than a sparse factorisation is done
 _MOST_FACTORISED = 50_000  # states; beyond, a factorisation does not fit into memory
 _TOLERANCE = 1e-12  # of the largest reward's perpetual value, for models solved by sweeps
@@ -107,36 +106,6 @@ def evaluate(mdp: MDP, policy: FloatArray, gamma: float) -> Solution:
     return _evaluated(mdp, gamma, policy)
 
 
-def undiscounted_totals(mdp: MDP, policy: FloatArray) -> FloatArray:
-    """Returns `[S, A]`: the expected total reward with γ = 1, NaN where no total exists.
-
-    It is the total of the given policy, as that was chosen under γ < 1 (errata P9). A total
-    exists where the policy, with probability 1, ends the episode or comes to where it is no
-    longer paid. Where that is 10¹² steps away or more, rounding would decide: NaN as well.
-    """
-    weights = _transition_weights(mdp, as_policy(policy, mdp))
-    rewards = mdp.per_state(weights * mdp.rewards)
-    edge = (weights > 0.0) & ~mdp.terminated
-    sources, targets = mdp.transition_states[edge], mdp.next_states[edge]
-    terminates = mdp.per_state(weights * mdp.terminated) > 0.0
-    pays = mdp.per_state(weights * np.abs(mdp.rewards)) > 0.0  # even if it is 0 on average
-    paid = _can_reach(pays, sources, targets)
-    comes_to_an_end = _can_reach(terminates | ~paid, sources, targets)
-    endless = _can_reach(~comes_to_an_end, sources, targets)
-    values = np.where(endless, np.nan, 0.0)
-    active = paid & ~endless
-    if active.any():
-        chain = weights * ~mdp.terminated
-        try:
-            steps = _solve_chain(mdp, chain, np.ones(mdp.num_states), active)
-            totals = _solve_chain(mdp, chain, rewards, active)
-            values[active] = np.where((steps >= 0.99) & (steps < _LONGEST), totals, np.nan)
-        except InputError:
-            values[active] = np.nan
-    follows = np.where(mdp.continuation > 0.0, mdp.continuation * values[mdp.next_states], 0.0)
-    return mdp.expected_rewards + mdp.per_action(follows)
-
-
 def _is_large(mdp: MDP, gamma: float) -> bool:
     if mdp.num_states <= SMALL:
         return False
@@ -219,7 +188,7 @@ def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, Float
     for _ in range(_MAX_IMPROVEMENTS):
         taken = actions[mdp.transition_states] == mdp.transition_actions
         rewards = mdp.expected_rewards[states, actions]
-        values = _solve_chain(mdp, gamma * mdp.continuation * taken, rewards)
+        values = solve_chain(mdp, gamma * mdp.continuation * taken, rewards)
         q_values = mdp.expected_rewards + gamma * mdp.expect(values)
         own = q_values[states, actions]
         best = q_values.argmax(axis=1)
@@ -290,10 +259,10 @@ def _evaluated(mdp: MDP, gamma: float, policy: FloatArray) -> Solution:
     turn is computed, enlarged, and checked: y ≥ (I − γC)⁻¹·x holds wherever y − γCy ≥ x does,
     and where x is missed by σ, adding 1.01·σ / (1 − γ) makes up for it.
     """
-    weights = _transition_weights(mdp, policy)
+    weights = transition_weights(mdp, policy)
     chain = gamma * weights * ~mdp.terminated
     rewards = mdp.per_state(weights * mdp.rewards)
-    values = _solve_chain(mdp, chain, rewards)
+    values = solve_chain(mdp, chain, rewards)
     next_values = values[mdp.next_states]
     rounding = _UNIT * (8 + int(np.diff(mdp.offsets).max()) * mdp.num_actions)
     size = mdp.per_state(np.abs(weights * mdp.rewards) + chain * np.abs(next_values)) + np.abs(
@@ -301,7 +270,7 @@ def _evaluated(mdp: MDP, gamma: float, policy: FloatArray) -> Solution:
     )
     residual = np.abs(rewards + mdp.per_state(chain * next_values) - values)
     residual += rounding * size + _UNDERFLOW
-    carried = 1.01 * np.abs(_solve_chain(mdp, chain, residual))
+    carried = 1.01 * np.abs(solve_chain(mdp, chain, residual))
     proven = carried - mdp.per_state(chain * carried[mdp.next_states]) - 2 * rounding * carried
     carried += 1.01 * max(float((residual - proven).max()), 0.0) / (1.0 - gamma)
     size_of_q = mdp.per_action(np.abs(mdp.probabilities * mdp.rewards)) + gamma * mdp.expect(
@@ -334,12 +303,12 @@ def _check(mdp: MDP, gamma: float) -> None:
         )
 
 
-def _transition_weights(mdp: MDP, policy: FloatArray) -> FloatArray:
+def transition_weights(mdp: MDP, policy: FloatArray) -> FloatArray:
     """Returns `[K]`: π(a|s)·P(s′|s, a)."""
     return np.asarray(policy[mdp.transition_states, mdp.transition_actions] * mdp.probabilities)
 
 
-def _solve_chain(
+def solve_chain(
     mdp: MDP, chain: FloatArray, right: FloatArray, among: BoolArray | None = None
 ) -> FloatArray:
     """Solves x = right + chain·x, for all states or for those in `among` with 0 outside."""
@@ -362,15 +331,6 @@ def _solve_chain(
             "The values are out of reach of double precision: the future is all but endless.",
             "Choose a smaller gamma.",
         ) from error
-
-
-def _can_reach(goal: BoolArray, sources: IntArray, targets: IntArray) -> BoolArray:
-    """Returns `[S]`: the states from which some path of edges leads into `goal`."""
-    reached, size = goal.copy(), -1
-    while reached.sum() != size:
-        size = int(reached.sum())
-        reached[sources[reached[targets]]] = True
-    return reached
 
 
 def _lowest(mask: BoolArray) -> FloatArray:

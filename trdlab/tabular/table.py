@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from trdlab.arrays import BoolArray, FloatArray
+from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
@@ -49,17 +49,7 @@ class ExactTable:
         Raises:
             InputError: an observation is not the index of a state.
         """
-        states = np.asarray(observations)
-        if states.dtype.kind not in "iu":
-            raise InputError(
-                f"The observations have type {states.dtype}.", "A table takes state indices."
-            )
-        if states.size and not 0 <= states.min() <= states.max() < self.mdp.num_states:
-            raise InputError(
-                f"The observations run from {states.min()} to {states.max()}.",
-                f"States run from 0 to {self.mdp.num_states - 1}.",
-            )
-        return self.decomposition[states]
+        return self.decomposition[as_states(observations, self.mdp.num_states)]
 
     @cached_property
     def state_decomposition(self) -> RewardDecomposition:
@@ -132,3 +122,22 @@ def exact(
     if ties == "lowest" and tied:
         return replace(table, future=Future(f"{whose} (of tied actions the first)"))
     return table
+
+
+def as_states(observations: Any, num_states: int) -> IntArray:
+    """Returns observations as state indices, checked.
+
+    Raises:
+        InputError: an observation is not the index of a state.
+    """
+    states = np.asarray(observations)
+    if states.dtype.kind not in "iu":
+        raise InputError(
+            f"The observations have type {states.dtype}.", "A table takes state indices."
+        )
+    if states.size and not 0 <= states.min() <= states.max() < num_states:
+        raise InputError(
+            f"The observations run from {states.min()} to {states.max()}.",
+            f"States run from 0 to {num_states - 1}.",
+        )
+    return states

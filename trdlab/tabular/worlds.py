@@ -9,6 +9,7 @@ import numpy.typing as npt
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.errors import InputError
 from trdlab.tabular.mdp import MDP
+from trdlab.tabular.reach import reachable
 
 if TYPE_CHECKING:
     from gymnasium import Env, Space
@@ -136,18 +137,6 @@ class GymWorlds:
             next_observations=following,
             active=active,
         )
-
-
-def reachable(mdp: MDP) -> BoolArray:
-    """Returns `[S]`: the states in which an action may have to be chosen, from the start on."""
-    goes_on = mdp.continuation > 0.0
-    sources, targets = mdp.transition_states[goes_on], mdp.next_states[goes_on]
-    reached, size = np.zeros(mdp.num_states, dtype=np.bool_), 0
-    reached[mdp.start] = True
-    while reached.sum() != size:
-        size = int(reached.sum())
-        reached[targets[reached[sources]]] = True
-    return reached
 
 
 def _size(name: str, space: "Space[Any]") -> int:

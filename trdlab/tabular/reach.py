@@ -1,0 +1,29 @@
+"""Which states can follow which."""
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, IntArray
+from trdlab.tabular.mdp import MDP
+
+
+def reached(begin: BoolArray, sources: IntArray, targets: IntArray) -> BoolArray:
+    """Returns `[S]`: the states in `begin [S]`, and all that edges lead to from there.
+
+    With sources and targets exchanged it tells from where `begin` can be reached.
+    """
+    found, size = begin.copy(), -1
+    while found.sum() != size:
+        size = int(found.sum())
+        found[targets[found[sources]]] = True
+    return found
+
+
+def reachable(mdp: MDP, starts: BoolArray | None = None) -> BoolArray:
+    """Returns `[S]`: the states in which an episode can go on that began in one of `starts [S]`.
+
+    A state in which it is over does not count. Without `starts` it begins in the model's own.
+    """
+    if starts is None:
+        starts = np.arange(mdp.num_states) == mdp.start
+    goes_on = mdp.continuation > 0.0
+    return reached(starts, mdp.transition_states[goes_on], mdp.next_states[goes_on])

@@ -17,10 +17,11 @@ from trdlab.explain.explanation import (
     explain,
 )
 from trdlab.explain.finding import Finding
-from trdlab.explain.moment import Moment
+from trdlab.explain.moment import Moment, moment_of
 from trdlab.explain.tabular import gridworld_moment
 from trdlab.gridworld import Gridworld, load_map, parse_map
-from trdlab.tabular import exact
+from trdlab.show import check, sentences
+from trdlab.tabular import exact, learn
 
 GAMMA = 0.95
 F = TypeVar("F", bound=Finding)
@@ -179,6 +180,32 @@ def test_costs_are_not_called_rewards():
     assert found(contrast.LessCostly, explanation)
     assert not found(contrast.MoreImmediate, explanation)
     assert not found(forecast.Peak, explanation)
+
+
+def test_a_learned_table_is_explained_like_an_exact_one():
+    world = Gridworld(load_map("drone"))
+    learned = learn(world.mdp, TimeAxis(GAMMA, 4), agent_steps=200_000, seed=0)
+    explanation = explain(moment_of(learned, 0, world.action_names), "down", "up")
+    (sooner,) = found(contrast.MoreImmediate, explanation)
+    assert (sooner.leader, sooner.last_step) == ("down", 3)
+    assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3, abs=0.02)
+    assert not found(contrast.EqualTotals, explanation)  # samples tell no undiscounted total
+    assert explanation.flips == ()  # and no model can be solved again
+    assert check(" ".join(sentences(explanation)), explanation)
+
+
+def test_uncertainty_is_told_where_there_is_any():
+    world = Gridworld(parse_map("T = treasure 4 terminal\nslip: 0.5\n---\n...\nS.T\n..."))
+    explanation = explained(world, TimeAxis(0.9, 6), action="right", foil="up")
+    (either,) = found(forecast.EitherOr, explanation)
+    # two moves to the right in a row succeed with 1/4: then 4 is paid at t+1
+    assert (either.component, either.reward, either.chance) == (1, 4.0, pytest.approx(0.25))
+    (give,) = found(forecast.GiveOrTake, explanation)
+    assert 0 < give.deviation < 2
+    assert not found(forecast.GiveOrTake, explained())  # nothing slips on the drone's map
+    assert found(forecast.LikelyOver, explained(axis=TimeAxis(GAMMA, 6))) == [
+        forecast.LikelyOver("down", 5, 1.0)
+    ]
 
 
 @pytest.mark.parametrize(

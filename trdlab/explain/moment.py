@@ -1,15 +1,16 @@
 """The moment that is explained: every action's decomposition, and what is known about it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, closest
-from trdlab.estimator import Future
+from trdlab.estimator import Estimator, Future
 
 RELATIVE_ZERO = 1e-12
 """Two components closer than this, relative to the larger, are the same number."""
@@ -154,6 +155,26 @@ class Moment:
         best = self.action_names[order[0]]
         action = action or next((name for name in options if name != foil), best)
         return action, foil or next((name for name in options if name != action), None)
+
+
+def moment_of(estimator: Estimator, observation: Any, action_names: Sequence[str]) -> Moment:
+    """Returns what any estimator expects at one observation, and nothing that it cannot know.
+
+    Args:
+        estimator: an exact table, a learned one, a network.
+        observation: one observation, without a batch axis.
+        action_names: A names.
+
+    Raises:
+        InputError: the number of names is not that of the actions.
+
+    >>> from trdlab.tabular import MDP, exact
+    >>> coin = MDP.from_transitions([[[(1.0, 0, 1.0, True)], [(1.0, 0, 0.0, False)]]])
+    >>> moment_of(exact(coin, TimeAxis(0.5, 1)), 0, ["take", "wait"]).q_value("wait")
+    0.5
+    """
+    batch = np.asarray(observation)[None]  # [1, ...]
+    return Moment(estimator.decompose(batch)[0], tuple(action_names), estimator.future)
 
 
 def same(a: float, b: float) -> bool:

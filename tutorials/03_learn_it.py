@@ -16,7 +16,7 @@ from matplotlib import pyplot as plt
 from trdlab.bellman import target
 from trdlab.decomposition import TimeAxis
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.tabular import exact, learn
+from trdlab.tabular import exact, learn, spread
 
 from exercise import check
 
@@ -244,17 +244,20 @@ policy = table.solution.policy.argmax(axis=1)
 paid = returns(bridge, policy, RIGHT, 5000, 8, rng)
 discounted = paid * AHEAD.discounts[:-1]
 
-print("step   component   average    spread    +4      0     −4")
+known = spread(table).deviation[bridge.mdp.start, RIGHT]  # without a single flight
+
+print("step   component   average    spread   exactly    +4      0     −4")
 for i in range(8):
     shares = [(paid[:, i] == pays).mean() for pays in (4, 0, -4)]
     print(
         f" t+{i} {right.components[i]:10.2f} {discounted[:, i].mean():10.2f}"
-        f" {discounted[:, i].std():9.2f} ",
+        f" {discounted[:, i].std():9.2f} {known[i]:9.2f} ",
         *(f"{share:6.1%}" for share in shares),
     )
 
 # %% [markdown]
-# The *spread* is the standard deviation: how far a reward usually is from its average. Where it is
+# The *spread* is the standard deviation: how far a reward usually is from its average. The exact model
+# knows it without a flight (`spread`), and the shares on the right too (`outcomes`). Where it is
 # small beside the component, the component is nearly a promise. Where it is large, it is a bet. The
 # shares on the right say which bet.
 

@@ -9,7 +9,7 @@ from trdlab.explain.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
 from trdlab.tabular.reach import reached
-from trdlab.tabular.spread import outcomes, spread
+from trdlab.tabular.uncertainty import outcomes, spread
 
 GAMMA_RANGE = (0.01, 0.99)
 MAX_SPREAD = 10_000_000  # states times steps, beyond which spread is not worked out

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from trdlab.tabular.named import Coordinate, TabularWorld
     from trdlab.tabular.operator import OperatorTable, operator_table
     from trdlab.tabular.toytext import make_world, tabular_world
+    from trdlab.tabular.uncertainty import Spread, outcomes, spread
     from trdlab.tabular.windows import WindowBuilder, Windows
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "LearnedTable",
     "OperatorTable",
     "Solution",
+    "Spread",
     "TabularWorld",
     "Ties",
     "WindowBuilder",
@@ -37,6 +39,8 @@ __all__ = [
     "make_world",
     "operator_table",
     "optimal",
+    "outcomes",
+    "spread",
     "tabular_world",
     "undiscounted_totals",
 ]
@@ -52,6 +56,9 @@ _HOMES = {
     "learn": "trdlab.tabular.learning",
     "OperatorTable": "trdlab.tabular.operator",
     "operator_table": "trdlab.tabular.operator",
+    "Spread": "trdlab.tabular.uncertainty",
+    "outcomes": "trdlab.tabular.uncertainty",
+    "spread": "trdlab.tabular.uncertainty",
     "WindowBuilder": "trdlab.tabular.windows",
     "Windows": "trdlab.tabular.windows",
 }

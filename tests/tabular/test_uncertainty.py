@@ -7,7 +7,7 @@ from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.gridworld import Gridworld, load_map, map_names, parse_map
 from trdlab.tabular import MDP, exact
-from trdlab.tabular.spread import outcomes, spread
+from trdlab.tabular.uncertainty import outcomes, spread
 
 SLIPPERY = "T = treasure 4 terminal\nH = hazard -2 terminal\nslip: 0.3\nstep_cost: 0.1\n---\n"
 WORLD = Gridworld(parse_map(SLIPPERY + "..c.T\n.#.#H\nS.c..\n"))

@@ -256,10 +256,10 @@ for i in range(8):
     )
 
 # %% [markdown]
-# The *spread* is the standard deviation: how far a reward usually is from its average. The exact model
-# knows it without a flight (`spread`), and the shares on the right too (`outcomes`). Where it is
+# The *spread* is the standard deviation: how far a reward usually is from its average. Where it is
 # small beside the component, the component is nearly a promise. Where it is large, it is a bet. The
-# shares on the right say which bet.
+# shares on the right say which bet. An exact model knows both without a flight: `spread` gave the
+# column *exactly*, and `outcomes` gives the shares.
 
 # %%
 figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")

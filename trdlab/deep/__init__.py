@@ -1,0 +1,1 @@
+"""Networks that decompose: the deep side of trdlab. Everything here imports torch."""

@@ -51,6 +51,8 @@ def test_json_has_full_precision_and_nothing_else_is_on_stdout(capsys: pytest.Ca
     assert actions["up"]["components"][-1] == pytest.approx(4 * 0.95**4, abs=1e-12)
     for action in actions.values():
         assert sum(action["components"]) == pytest.approx(action["q_value"], abs=1e-12)
+    assert actions["down"]["deviation"] == [0.0] * 5
+    assert actions["down"]["survival"] == [1.0] * 5
     kinds = {finding["kind"] for finding in data["findings"]}
     assert {"equal-totals", "more-immediate", "never-flips", "whose-future"} <= kinds
     assert all(finding["sentence"].endswith(".") for finding in data["findings"])

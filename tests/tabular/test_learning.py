@@ -384,7 +384,7 @@ def test_it_says_whose_future_it_tells(options, policy):
         ({"loss": "mean"}, r"The loss is 'mean'\. Known: components, sum\."),
         ({"agent_steps": 0}, r"The number of agent steps is 0\. It must be at least 1\."),
         ({"num_envs": 0}, r"The number of environments is 0\. It must be at least 1\."),
-        ({"policy": np.ones((2, 4))}, r"shape \(2, 4\)\. This world needs \(16, 4\)"),
+        ({"policy": np.ones((2, 4))}, r"shape \(2, 4\)\. The model needs \(16, 4\)"),
         ({"policy": np.ones((16, 4))}, "not a probability distribution"),
         ({"initial": np.zeros((16, 4, 4))}, r"shape \(16, 4, 4\).*of shape \(16, 4, 5\)"),
         ({"initial": np.full((16, 4, 5), np.nan)}, "an entry that is not finite"),

@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from trdlab.explain.explanation import Explanation
+from trdlab.explain.moment import Moment
 from trdlab.explain.tabular import MAX_WHAT_IF_STATES
 from trdlab.formatting import plain
 from trdlab.show.sentences import sentence
@@ -136,6 +137,7 @@ def to_dict(report: Report) -> dict[str, Any]:
                 "undiscounted_total": _or_none(moment.total(name)),
                 "probability": float(report.table.solution.policy[report.state, i]),
                 "changes_state": bool(moment.changes_state and moment.changes_state[i]),
+                **_uncertainty(moment, i),
             }
             for i, name in enumerate(moment.action_names)
         },
@@ -146,6 +148,17 @@ def to_dict(report: Report) -> dict[str, Any]:
             for finding in explanation.findings
         ],
         "checks": {"sum_error": report.sum_error, "error_bound": report.error_bound},
+    }
+
+
+def _uncertainty(moment: Moment, action: int) -> dict[str, Any]:
+    known = moment.uncertainty
+    if known is None:
+        return {}
+    return {
+        "deviation": known.deviation[action].tolist(),
+        "return_deviation": float(known.return_deviation[action]),
+        "survival": known.survival[action].tolist(),
     }
 
 

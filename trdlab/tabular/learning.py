@@ -10,7 +10,7 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, TrdlabError, closest
 from trdlab.estimator import Future
 from trdlab.tabular.learned import LearnedTable
-from trdlab.tabular.mdp import MDP
+from trdlab.tabular.mdp import MDP, as_policy
 from trdlab.tabular.operator import check_epsilon, epsilon_greedy
 from trdlab.tabular.windows import WindowBuilder, Windows
 from trdlab.tabular.worlds import GymWorlds, ModelWorlds
@@ -102,7 +102,7 @@ def learn(
     )
     num_actions = worlds.num_actions
     table = _initial(initial, (worlds.num_states, num_actions, time_axis.num_components))
-    given = None if policy is None else _checked_policy(policy, table.shape[:2])
+    given = None if policy is None else as_policy(policy, table.shape[:2])
     builder = WindowBuilder(width, gamma, worlds.num_envs, time_limit=worlds.time_limit)
     visits, updates = (np.zeros(table.shape[:2], dtype=np.int64) for _ in range(2))
     mean_table, left_out = table.copy(), 0
@@ -200,18 +200,6 @@ def _initial(initial: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
             f"Give finite numbers of shape {shape}.",
         )
     return table
-
-
-def _checked_policy(policy: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    policy = np.asarray(policy, dtype=np.float64)
-    if policy.shape != shape:
-        raise InputError(f"The policy has shape {policy.shape}.", f"This world needs {shape}.")
-    if not np.all(policy >= 0.0) or np.any(np.abs(policy.sum(axis=1) - 1.0) > 1e-9):
-        raise InputError(
-            "A row of the policy is not a probability distribution.",
-            "Each state's action probabilities must be at least 0 and sum to 1.",
-        )
-    return policy
 
 
 def _refuse_nothing_learned(used: int, left_out: int, builder: WindowBuilder) -> None:

@@ -133,6 +133,11 @@ class MDP:
         """S."""
         return (len(self.offsets) - 1) // self.num_actions
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """S and A."""
+        return self.num_states, self.num_actions
+
     @cached_property
     def continuation(self) -> FloatArray:
         """`[K]`: the probability of each transition, zero where the episode ends."""
@@ -214,14 +219,17 @@ class MDP:
         return f"State {row // self.num_actions}, action {row % self.num_actions}"
 
 
-def as_policy(probabilities: Any, mdp: MDP) -> FloatArray:
-    """Returns a stochastic policy `[S, A]`, checked against the model.
+def as_policy(probabilities: Any, shape: tuple[int, ...]) -> FloatArray:
+    """Returns a stochastic policy `[S, A]`, checked.
+
+    Args:
+        probabilities: of each action in each state.
+        shape: S and A.
 
     Raises:
         InputError: wrong shape, or a row that is no probability distribution.
     """
     policy = np.asarray(probabilities, dtype=np.float64)
-    shape = (mdp.num_states, mdp.num_actions)
     if policy.shape != shape:
         raise InputError(f"The policy has shape {policy.shape}.", f"The model needs {shape}.")
     if not np.all(policy >= 0.0) or np.any(np.abs(policy.sum(axis=1) - 1.0) > 1e-9):

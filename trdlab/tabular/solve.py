@@ -99,7 +99,7 @@ def evaluate(mdp: MDP, policy: FloatArray, gamma: float) -> Solution:
             out of reach of double precision.
     """
     _check(mdp, gamma)
-    policy = as_policy(policy, mdp)
+    policy = as_policy(policy, mdp.shape)
     if _is_large(mdp, gamma):
         start = np.zeros(mdp.num_states)
         return _evaluated_by_sweeps(mdp, gamma, policy, _default_tolerance(mdp, gamma), start)

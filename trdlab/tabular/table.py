@@ -115,7 +115,7 @@ def exact(
     if policy is None:
         solution, whose = optimal(mdp, gamma, ties=ties), _TIED_POLICIES[ties]
     else:
-        solution, whose = evaluate(mdp, as_policy(policy, mdp), gamma), "the given policy"
+        solution, whose = evaluate(mdp, as_policy(policy, mdp.shape), gamma), "the given policy"
     components = RewardDecomposition(decompose(mdp, solution, time_axis, dtype), time_axis)
     table = ExactTable(mdp, solution, components, Future(whose))
     tied = solution.tied.any() if mdp.num_states > _MANY else table.ambiguous.any()

@@ -18,7 +18,7 @@ def undiscounted_totals(mdp: MDP, policy: FloatArray) -> FloatArray:
     exists where the policy, with probability 1, ends the episode or comes to where it is no
     longer paid. Where that is 10¹² steps away or more, rounding would decide: NaN as well.
     """
-    weights = transition_weights(mdp, as_policy(policy, mdp))
+    weights = transition_weights(mdp, as_policy(policy, mdp.shape))
     rewards = mdp.per_state(weights * mdp.rewards)
     edge = (weights > 0.0) & ~mdp.terminated
     sources, targets = mdp.transition_states[edge], mdp.next_states[edge]

@@ -203,9 +203,8 @@ def test_uncertainty_is_told_where_there_is_any():
     (give,) = found(forecast.GiveOrTake, explanation)
     assert 0 < give.deviation < 2
     assert not found(forecast.GiveOrTake, explained())  # nothing slips on the drone's map
-    assert found(forecast.LikelyOver, explained(axis=TimeAxis(GAMMA, 6))) == [
-        forecast.LikelyOver("down", 5, 1.0)
-    ]
+    over = found(forecast.SurelyOver, explained(axis=TimeAxis(GAMMA, 6)))
+    assert over == [forecast.SurelyOver("down", 5)]
 
 
 @pytest.mark.parametrize(

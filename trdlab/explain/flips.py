@@ -22,19 +22,21 @@ def what_would_flip(moment: Moment, action: str, foil: str) -> tuple[Finding, ..
     """Returns where the preference flips as each quantity varies, or that it never does.
 
     The policy is re-optimised at every value. A preference that stays the same but for ties counts
-    as never flipping.
+    as never flipping. Where the actions tie as it is, there is no preference to flip.
 
     Raises:
         InputError: there is no such action.
     """
     i, j = moment.index(action), moment.index(foil)
+    if same(moment.q_value(action), moment.q_value(foil)):
+        return ()
     found: list[Finding] = []
     for what_if in moment.what_ifs:
         name, low, high = what_if.name, what_if.low, what_if.high
         at = find_flips(lambda x, w=what_if: w.gap(i, j, x), low, high)  # type: ignore[misc]
         if at:
             found.append(Flips(action, foil, name, what_if.current, low, high, at))
-        elif not same(moment.q_value(action), moment.q_value(foil)):
+        else:
             better, worse = moment.ordered(action, foil)
             found.append(NeverFlips(better, worse, name, low, high))
     return tuple(found)

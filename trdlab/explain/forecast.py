@@ -75,7 +75,9 @@ def _chances(moment: Moment, action: str) -> tuple[Finding, ...]:
     over = np.flatnonzero(known.survival[a] < 0.5)
     if over.size:
         i = int(over[0])
-        findings.append(LikelyOver(action, i, 1.0 - float(known.survival[a, i])))
+        chance = 1.0 - float(known.survival[a, i])
+        sure = SurelyOver(action, i)
+        findings.append(sure if sure.holds(moment) else LikelyOver(action, i, chance))
     return tuple(findings)
 
 
@@ -251,13 +253,25 @@ class LikelyOver(Finding):
     chance: float
 
     def holds(self, moment: Moment) -> bool:
-        if moment.uncertainty is None:
-            return False
-        survival = moment.uncertainty.survival[moment.index(self.action)]
-        i = self.component
-        return (
-            i < len(survival)
-            and bool(survival[i] < 0.5)
-            and not (survival[:i] < 0.5).any()
-            and agrees(self.chance, 1.0 - float(survival[i]))
-        )
+        survival = _survival_when_likely_over(moment, self.action, self.component)
+        return survival is not None and survival > 0.0 and agrees(self.chance, 1.0 - survival)
+
+
+@dataclass(eq=False, repr=False)
+class SurelyOver(Finding):
+    """The same where it has ended for certain."""
+
+    action: str
+    component: int
+
+    def holds(self, moment: Moment) -> bool:
+        return _survival_when_likely_over(moment, self.action, self.component) == 0.0
+
+
+def _survival_when_likely_over(moment: Moment, action: str, component: int) -> float | None:
+    """Returns the survival at a component, if it is the first at which it is below one half."""
+    if moment.uncertainty is None:
+        return None
+    survival = moment.uncertainty.survival[moment.index(action)]
+    below = np.flatnonzero(survival < 0.5)
+    return float(survival[component]) if below.size and below[0] == component else None

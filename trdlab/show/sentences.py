@@ -95,6 +95,7 @@ TEMPLATES: dict[type[Finding], str] = {
     forecast.LikelyOver: (
         "After {action} the episode is likely over by {component:begin}: {chance:percent}."
     ),
+    forecast.SurelyOver: "After {action} the episode is over by {component:begin}.",
     explanation.WhoseFuture: "After the first action it is the future of {policy}.",
     explanation.TiedActions: (
         "Here {actions:names} tie: their values are equal, their futures are not."

@@ -45,5 +45,5 @@ def closest(name: str, known: Iterable[str]) -> str:
 
     names = sorted(known)
     options = {option.lower(): option for option in names}
-    near = get_close_matches(name.lower(), options, n=1)
+    near = get_close_matches(name.lower(), options, n=1, cutoff=0.7)
     return f"Did you mean '{options[near[0]]}'?" if near else f"Known: {', '.join(names)}."

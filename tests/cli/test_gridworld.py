@@ -94,12 +94,35 @@ def test_a_map_file(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     code, out, _ = run(capsys, "gridworld", "--map", str(path))
     assert code == 0
     assert out.startswith("mine · Mine")
-    assert "Up and down promise the same rewards at the same times." in out
+    assert "Up and down have the same components." in out
     assert f"Try: trdlab gridworld --map {path}" in "".join(out.split("\n"))
+
+
+def test_a_gamma_too_close_to_1_is_not_called_exact(capsys: pytest.CaptureFixture[str]):
+    _, out, _ = run(capsys, "gridworld", "--map", "loop", "--gamma", "0.9999999")
+    assert "γ is so close to 1 that Q is only known to" in " ".join(out.split())
+    assert "exact" not in out
+
+
+def test_the_next_step_keeps_what_was_given(capsys: pytest.CaptureFixture[str]):
+    _, out, _ = run(capsys, "gridworld", "--slip", "0.3", "--treasure", "5", "--w", "2")
+    advice = " ".join(out.split()).partition("Try: ")[2]
+    assert "--slip 0.3 --treasure 5" in advice
+    assert advice.count("--treasure") == 1
+
+
+def test_a_full_disk_is_one_line():
+    command = f"{sys.executable} -m trdlab gridworld > /dev/full"
+    shown = subprocess.run(command, shell=True, capture_output=True, check=False)
+    assert shown.returncode == 1
+    assert b"No space left on device" in shown.stderr
+    assert b"Traceback" not in shown.stderr
 
 
 def test_list_shows_every_map(capsys: pytest.CaptureFixture[str]):
     _, out, _ = run(capsys, "gridworld", "--list")
+    _, as_json, _ = run(capsys, "gridworld", "--list", "--json")
+    assert [entry["name"] for entry in json.loads(as_json)][0] == "drone"
     for name in ("drone", "patience", "bridge", "tie", "corridor", "loop", "windy"):
         assert f"\n{name}" in out
 

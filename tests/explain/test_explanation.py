@@ -99,7 +99,8 @@ def test_a_given_policy_has_no_what_ifs_and_is_named():
     table = exact(world.mdp, TimeAxis(GAMMA, 2), policy=uniform)
     explanation = explain(gridworld_moment(world, table, 0), "down", "up")
     assert explanation.flips == ()
-    assert explanation.context == (WhoseFuture("the given policy"),)
+    assert [type(x) for x in explanation.context] == [WhoseFuture]
+    assert found(WhoseFuture, explanation)[0].policy == "the given policy"
 
 
 def test_contrasts_never_default_to_an_action_that_stays():
@@ -121,7 +122,9 @@ def test_ties_are_carried_and_said():
     tie = Gridworld(load_map("tie"))
     explanation = explained(tie)
     assert explanation.context[1:] == (TiedActions(("left", "right")),)
-    assert explanation.context[0] == WhoseFuture("the optimal policy (of tied actions the first)")
+    (whose,) = found(WhoseFuture, explanation)
+    assert whose.policy == "the optimal policy (of tied actions the first)"
+    assert (whose.reward, whose.ending) == ("reward as the environment pays it", "terminal states")
     mixed = explained(tie, ties="mixed")
     assert "mixes tied actions evenly" in found(WhoseFuture, mixed)[0].policy
     before = Gridworld(

@@ -18,6 +18,12 @@ def test_none_is_a_possible_answer():
     assert find_flips(lambda x: x * x + 0.1, -1.0, 1.0) == ()
 
 
+def test_a_pair_of_flips_in_the_last_interval_is_found():
+    for mirror in (1.0, -1.0):
+        roots = find_flips(lambda x, m=mirror: (m * x - 0.991) * (m * x - 0.993), -1.0, 1.0)
+        assert sorted(mirror * root for root in roots) == pytest.approx([0.991, 0.993], abs=1e-11)
+
+
 def test_roots_that_fall_on_samples_are_found():
     assert find_flips(lambda x: (x - 0.5) * (x - 0.515625), 0.0, 1.0) == (0.5, 0.515625)
 

@@ -18,7 +18,7 @@ from trdlab.show.sentences import TEMPLATES, UnsupportedSentenceError, check, se
 from trdlab.tabular import exact
 
 NAMES = ("up", "down", "FIRE", "move left")
-SYMMETRIC = ("promise the same rewards", "are both worth", "tie: their values")
+SYMMETRIC = ("have the same components", "are both worth", "tie: their values")
 WORDS = {
     "more": "fewer",
     "never": "always",

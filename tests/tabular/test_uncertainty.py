@@ -112,3 +112,18 @@ def test_rewards_that_depend_on_the_next_state_only_vary_with_it():
 def test_an_unknown_state_is_refused():
     with pytest.raises(InputError, match="There is no state 99 with action 0"):
         outcomes(WORLD.mdp, np.ones((WORLD.mdp.num_states, 4)) / 4, 99, 0, 1)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e6])
+def test_a_small_spread_around_a_large_reward_is_not_lost(offset: float):
+    rewards = [(0.5, 0, offset, True), (0.5, 0, offset + 0.5, True)]
+    known = spread(exact(MDP.from_transitions([[rewards]]), TimeAxis(0.9, 1)))
+    assert known.variance[0, 0, 0] == pytest.approx(0.0625, rel=1e-9)
+    assert known.return_variance[0, 0] == pytest.approx(0.0625, rel=1e-9)
+
+
+def test_a_circle_without_chance_has_no_spread_however_long_it_is_followed():
+    circle = [[[(1.0, (s + 1) % 5, float(s) / 3, False)]] for s in range(5)]
+    known = spread(exact(MDP.from_transitions(circle), TimeAxis(1 - 1e-6, 3, 2)))
+    assert known.deviation.max() < 1e-9
+    assert np.sqrt(known.return_variance.max()) < 1e-3  # beside returns of a million

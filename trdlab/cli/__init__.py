@@ -22,13 +22,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
             raise
         _fail(f"{error.cause} {error.cure}".strip(), error.exit_code)
     except usage_error as error:
+        if not error.format_message():  # no command was given, and the help has been printed
+            sys.exit(2)
         path = error.ctx.command_path if error.ctx else "trdlab"
         _fail(f"{error.format_message()} See: {path} --help", 2)
-    except typer.Abort:
+    except (typer.Abort, KeyboardInterrupt):
         _fail("Interrupted.", 130)
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:  # such as a disk that is full, where stdout goes
+        if {"-v", "--verbose"} & set(words):
+            raise
+        _fail(f"The output cannot be written: {error.strerror or error}.", 1)
     else:
         sys.exit(code or 0)
 

@@ -44,6 +44,12 @@ def new_console() -> tuple[Console, bool]:
     return console, not console.encoding.lower().startswith("utf")
 
 
+def print_json(data: object) -> None:
+    """Prints plain data as JSON, never through rich."""
+    json.dump(data, sys.stdout, indent=2, allow_nan=False)
+    print()
+
+
 def publish(
     solve: Callable[[], "Report"], *, plot: Path | None, overwrite: bool, as_json: bool
 ) -> None:
@@ -63,8 +69,7 @@ def publish(
         check_picture(plot, overwrite=overwrite)
     report = solve()
     if as_json:
-        json.dump(show.to_dict(report), sys.stdout, indent=2, allow_nan=False)
-        print()
+        print_json(show.to_dict(report))
     else:
         console, ascii_only = new_console()
         console.print(show.page(report, ascii_only=ascii_only))

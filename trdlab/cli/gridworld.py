@@ -47,6 +47,9 @@ def gridworld(
     """
     from trdlab.show import gridworld as show
 
+    if list_maps and as_json:
+        common.print_json(show.map_entries())
+        return
     if list_maps:
         console, ascii_only = common.new_console()
         console.print(show.map_list(ascii_only=ascii_only))

@@ -1,6 +1,6 @@
 """The explanation: findings about a moment, ready to be rendered as text, picture or JSON."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 from trdlab.explain.contrast import contrast
 from trdlab.explain.finding import Finding
@@ -60,18 +60,20 @@ def explain(moment: Moment, action: str | None = None, foil: str | None = None) 
         contrast=() if foil is None else contrast(moment, action, foil),
         flips=() if foil is None else what_would_flip(moment, action, foil),
         forecast=forecast(moment, action),
-        context=(WhoseFuture(moment.future.policy), *ties, *later),
+        context=(WhoseFuture(*astuple(moment.future)), *ties, *later),
     )
 
 
 @dataclass(eq=False, repr=False)
 class WhoseFuture(Finding):
-    """Who acts after the first action."""
+    """Who acts after the first action, which reward counts, and what ends it."""
 
     policy: str
+    reward: str
+    ending: str
 
     def holds(self, moment: Moment) -> bool:
-        return self.policy == moment.future.policy
+        return (self.policy, self.reward, self.ending) == astuple(moment.future)
 
 
 @dataclass(eq=False, repr=False)

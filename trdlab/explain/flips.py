@@ -46,8 +46,9 @@ def find_flips(gap: Gap, low: float, high: float, *, samples: int = SAMPLES) -> 
     """Returns the values between `low` and `high` at which `gap` changes its sign, in order.
 
     The interval is sampled evenly and each sign change is refined. Where |gap| dips between
-    three samples of one sign, its bottom is sought too, for a pair of flips may hide there. A gap
-    that touches zero without crossing it is no flip.
+    three samples of one sign, or towards an end of the interval, its bottom is sought too, for a
+    pair of flips may hide there. A gap that touches zero without crossing it is no flip. Samples
+    prove nothing about what lies between them.
 
     Args:
         gap: a continuous function, for example Q(action) − Q(foil) as γ varies.
@@ -78,7 +79,11 @@ def _beside_zeros(known: dict[float, float]) -> list[float]:
 def _bottoms(gap: Gap, known: dict[float, float]) -> list[float]:
     """Returns where |gap| is least, between each three samples of one sign that show a dip."""
     points = list(known)
-    found = []
+    found = [
+        _bottom(gap, min(x, y), max(x, y), known[x])
+        for x, y in (points[:2], points[:-3:-1])  # the first interval, and the last one backward
+        if known[x] * known[y] > 0.0 and abs(known[x]) < abs(known[y])
+    ]
     for x, y, z in zip(points, points[1:], points[2:], strict=False):
         before, here, after = known[x], known[y], known[z]
         one_sign = before * after > 0.0 and before * here >= 0.0
@@ -146,7 +151,7 @@ class Flips(Finding):
 
 @dataclass(eq=False, repr=False)
 class NeverFlips(Finding):
-    """The preference stays the same over all values of one quantity."""
+    """No flip was found: the preference is the same at all sampled values of one quantity."""
 
     better: str
     worse: str

@@ -69,8 +69,29 @@ def report(
     index = world.find_state(state)
     table = exact(world.mdp, axis, ties=ties)
     moment = gridworld_moment(world, table, index)
-    scene = _scene(world, index, map_name, axis)
+    given = {
+        "--slip": slip,
+        "--treasure": treasure,
+        "--state": None if state == "0" else state,
+        "--action": action,
+        "--foil": foil,
+        "--ties": None if ties == "lowest" else ties,
+    }
+    scene = _scene(world, index, _next_step(world, map_name, axis, given))
     return GridworldReport(scene, table, index, explain(moment, action, foil), world)
+
+
+def map_entries() -> list[dict[str, Any]]:
+    """Returns what there is to say of each built-in map, as plain data."""
+    entries = []
+    for name in map_names():
+        grid = load_map(name)
+        rows, columns = grid.shape
+        states = len(Gridworld(grid).states)
+        entries.append(
+            {"name": name, "rows": rows, "columns": columns, "states": states, "title": grid.title}
+        )
+    return entries
 
 
 def map_list(*, ascii_only: bool = False) -> RenderableType:
@@ -78,16 +99,14 @@ def map_list(*, ascii_only: bool = False) -> RenderableType:
     table = Table(box=None, padding=(0, 3, 0, 0), header_style="bold", pad_edge=False)
     for heading in ("map", "rows x columns", "states", "what it shows"):
         table.add_column(heading)
-    for name in map_names():
-        grid = load_map(name)
-        rows, columns = grid.shape
-        states = len(Gridworld(grid).states)
-        row = (name, f"{rows} x {columns}", str(states), grid.title)
+    for entry in map_entries():
+        size = f"{entry['rows']} x {entry['columns']}"
+        row = (entry["name"], size, str(entry["states"]), entry["title"])
         table.add_row(*(Text(fit(cell, ascii_only=ascii_only)) for cell in row))
     return table
 
 
-def _scene(world: Gridworld, index: int, map_name: str, axis: TimeAxis) -> Scene:
+def _scene(world: Gridworld, index: int, next_step: str) -> Scene:
     grid, state = world.grid, world.states[index]
     rules = [f"slip {plain(grid.slip)}"] * bool(grid.slip)
     rules += [f"each step costs {plain(grid.step_cost)}"] * bool(grid.step_cost)
@@ -100,7 +119,7 @@ def _scene(world: Gridworld, index: int, map_name: str, axis: TimeAxis) -> Scene
         rules=tuple(rules),
         drawing=ansi(world, index),
         legend=tuple(_legend(world)),
-        next_step=_next_step(world, map_name, axis),
+        next_step=next_step,
         world={
             "map": {
                 "name": grid.name,
@@ -139,11 +158,19 @@ def _legend(world: Gridworld) -> list[str]:
     return entries
 
 
-def _next_step(world: Gridworld, map_name: str, axis: TimeAxis) -> str:
-    """Returns a command that shows something new about this very map."""
-    base = f"trdlab gridworld --map {shlex.quote(map_name)} --gamma {plain(axis.gamma)}"
+def _next_step(
+    world: Gridworld, map_name: str, axis: TimeAxis, given: dict[str, str | float | None]
+) -> str:
+    """Returns a command that shows something new about this very map, all else being equal."""
+    words = ["trdlab", "gridworld", "--map", map_name, "--gamma", plain(axis.gamma)]
+    for option, value in given.items():
+        if value is not None:
+            words += [option, value if isinstance(value, str) else plain(value)]
+    base = shlex.join(words)
     if axis.width > 1:
         return f"{base} --N {axis.num_steps} --w 1 (the same steps one by one)"
-    if any(source.kind == "treasure" for source in world.sources):
-        return f"{base} --N {axis.horizon} --treasure 5 --plot treasure.png"
+    treasures = [source.value for source in world.sources if source.kind == "treasure"]
+    if treasures and given["--treasure"] is None:
+        richer = plain(treasures[0] + 1.0)
+        return f"{base} --N {axis.horizon} --treasure {richer} --plot treasure.png"
     return f"{base} --N {2 * axis.horizon + 2} (a longer horizon)"

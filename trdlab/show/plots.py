@@ -93,7 +93,7 @@ def report_figure(report: Report) -> Figure:
         0.012,
         f"γ = {plain(axis.gamma)}, N = {axis.horizon}, w = {axis.width} · after the first action "
         f"the future of {moment.future.policy} · {moment.future.reward} · ends at "
-        f"{moment.future.ending}",
+        f"{moment.future.ending}{_whiskers(moment)}",
         fontsize=8,
         color=_MUTED,
         ha="center",
@@ -306,6 +306,11 @@ def plot_contrast(ax: Axes, moment: Moment, action: str, foil: str) -> Axes:
     gap = moment.q_value(action) - moment.q_value(foil)
     ax.set_title(f"{action} − {foil}: {_short(gap)} in all", fontsize=10, loc="left")
     return ax
+
+
+def _whiskers(moment: Moment) -> str:
+    drawn = moment.uncertainty is not None and bool(moment.uncertainty.deviation.any())
+    return " · whiskers: one standard deviation" if drawn else ""
 
 
 def _positions(axis: TimeAxis) -> FloatArray:

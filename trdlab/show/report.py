@@ -18,6 +18,8 @@ from trdlab.show.sentences import sentence
 from trdlab.show.text import action_table, fit, story
 from trdlab.tabular import ExactTable
 
+_MOST_ERROR = 1e-6  # of the largest Q-value, beyond which it is not called exact
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -74,6 +76,11 @@ class Report:
         return float(np.abs(self.table.decomposition.value - self.table.solution.q_values).max())
 
     @property
+    def largest(self) -> float:
+        """The largest Q-value, as an amount."""
+        return float(np.abs(self.table.solution.q_values).max())
+
+    @property
     def error_bound(self) -> float:
         """How far the Q-values can be from the exact ones (proven)."""
         return float(self.table.solution.error_bound.max())
@@ -93,13 +100,17 @@ def page(report: Report, *, ascii_only: bool = False) -> RenderableType:
         "What would flip the preference was not searched: "
         f"this {scene.kind} has over {MAX_WHAT_IF_STATES} states."
     )
-    check = (
-        f"✓ Components sum to Q (largest difference {report.sum_error:.0e}); "
-        f"Q is exact to {report.error_bound:.0e} (proven)."
-    )
 
     def line(text: str, style: str = "") -> Text:
         return Text(fit(text, ascii_only=ascii_only), style=style)
+
+    summed = f"Components sum to Q (largest difference {report.sum_error:.0e});"
+    bound = f"{report.error_bound:.0e}"
+    check = (
+        line(f"✓ {summed} Q is exact to {bound} (proven).", "green")
+        if report.error_bound <= _MOST_ERROR * max(1.0, report.largest)
+        else line(f"{summed} γ is so close to 1 that Q is only known to {bound}.", "red")
+    )
 
     is_searched = explanation.foil is None or bool(explanation.moment.what_ifs)
     return Group(
@@ -116,7 +127,7 @@ def page(report: Report, *, ascii_only: bool = False) -> RenderableType:
         story(explanation, ascii_only=ascii_only),
         *([] if is_searched else [line(unsearched, "dim")]),
         line(""),
-        line(check, "green"),
+        check,
         line(f"Try: {scene.next_step}", "dim"),
     )
 

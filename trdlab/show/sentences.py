@@ -22,16 +22,16 @@ TEMPLATES: dict[type[Finding], str] = {
     contrast.DifferentTotals: (
         "In total {more} pays {more_total:amount} and {less} {less_total:amount}."
     ),
-    contrast.NoTotal: "The rewards of {action} never end, so they have no undiscounted total.",
+    contrast.NoTotal: "{action} has no undiscounted total, for its rewards may never end.",
     contrast.MoreImmediate: (
-        "{leader} gives more immediate rewards than {other}: {leader_sum:value} against "
-        "{other_sum:value} by {last_step:step}."
+        "{leader} gives more immediate rewards than {other}: by {last_step:step} they are worth "
+        "{leader_sum:value} against {other_sum:value}."
     ),
     contrast.LessCostly: (
-        "{leader} costs less at first than {other}: {leader_sum:value} against {other_sum:value} "
-        "by {last_step:step}."
+        "{leader} costs less at first than {other}: by {last_step:step} its rewards are worth "
+        "{leader_sum:value} against {other_sum:value}."
     ),
-    contrast.SameComponents: "{action} and {foil} promise the same rewards at the same times.",
+    contrast.SameComponents: "{action} and {foil} have the same components.",
     contrast.BetterByDiscount: (
         "Only the discount tells them apart: with γ = {gamma:plain} {better} is worth "
         "{better_value:value} and {worse} {worse_value:value}."
@@ -58,47 +58,55 @@ TEMPLATES: dict[type[Finding], str] = {
         " from {low:plain} to {high:plain}, policy re-optimised)."
     ),
     flips.NeverFlips: (
-        "No value of {quantity} from {low:plain} to {high:plain} would make {worse} better than "
-        "{better} (policy re-optimised)."
+        "No value of {quantity} was found from {low:plain} to {high:plain} that makes {worse} "
+        "better than {better} (policy re-optimised)."
     ),
-    forecast.EarnsNothing: "{action} earns nothing.",
+    forecast.EarnsNothing: "Nothing is expected of {action} at any step.",
     forecast.AllBeyond: (
         "All of the {value:value} that {action} is worth lies at {component:label}."
     ),
     forecast.FirstStepReward: (
-        "The first reward after {action} comes at {component:label}: {reward:amount}, worth "
-        "{discounted:value} now."
+        "The first reward to be expected of {action} is that of {component:label}: "
+        "{reward:amount} on average, worth {discounted:value} now."
     ),
     forecast.FirstReward: (
-        "The first reward after {action} comes at {component:label}, worth {discounted:value} now."
-    ),
-    forecast.FirstStepCost: (
-        "{action} first costs something at {component:label}: {reward:amount}, worth "
+        "The first reward to be expected of {action} is that of {component:label}, worth "
         "{discounted:value} now."
     ),
+    forecast.FirstStepCost: (
+        "{action} is first expected to cost something at {component:label}: {reward:amount} on "
+        "average, worth {discounted:value} now."
+    ),
     forecast.FirstCost: (
-        "{action} first costs something at {component:label}, worth {discounted:value} now."
+        "{action} is first expected to cost something at {component:label}, worth "
+        "{discounted:value} now."
     ),
     forecast.Peak: (
-        "The largest expected reward of {action} comes at {component:label}: {discounted:value}."
+        "The largest component of {action} is that of {component:label}: {discounted:value}."
     ),
-    forecast.CentreOfMass: "The rewards of {action} before the residual centre on t+{step:value}.",
+    forecast.CentreOfMass: (
+        "Weighted by what they are worth now, the rewards of {action} before the residual centre "
+        "on t+{step:value}."
+    ),
     forecast.ShareBeyond: "{share:percent} of the value of {action} lies at {component:label}.",
     forecast.GiveOrTake: (
-        "All in all {action} is worth {value:value}, give or take {deviation:value} (one standard "
-        "deviation)."
+        "What {action} is worth on average, {value:value}, varies by {deviation:value} from "
+        "episode to episode (one standard deviation)."
     ),
     forecast.EitherOr: (
-        "At {component:label} {action} pays either {reward:amount} or nothing: {chance:percent} to "
-        "get it."
+        "At {component:label} {action} pays either {reward:amount} or nothing; the chance that it "
+        "pays is {chance:percent}."
     ),
     forecast.LikelyOver: (
         "After {action} the episode is likely over by {component:begin}: {chance:percent}."
     ),
     forecast.SurelyOver: "After {action} the episode is over by {component:begin}.",
-    explanation.WhoseFuture: "After the first action it is the future of {policy}.",
+    explanation.WhoseFuture: (
+        "After the first action it is the future of {policy}; it counts the {reward} and ends at "
+        "{ending}."
+    ),
     explanation.TiedActions: (
-        "Here {actions:names} tie: their values are equal, their futures are not."
+        "Here {actions:names} tie: their values cannot be told apart, their futures can."
     ),
     explanation.TiedLater: (
         "Later states in which optimal actions tie but their futures differ: {states:count}."
@@ -289,7 +297,7 @@ def _pattern(template: str, action_names: tuple[str, ...]) -> re.Pattern[str]:
     action = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     pattern, end = "", 0
     for match in _SLOT.finditer(template):
-        free = match[1] in ("policy", "quantity")
+        free = match[1] in ("policy", "reward", "ending", "quantity")
         form = _FORMS[match[2] or "word"].pattern or (".+?" if free else action)
         pattern += re.escape(template[end : match.start()]) + f"(?P<{match[1]}>{form})"
         end = match.end()

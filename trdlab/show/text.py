@@ -14,7 +14,7 @@ from trdlab.explain.moment import Moment
 from trdlab.formatting import amount, decimals_for, number
 from trdlab.show.sentences import sentence
 
-_MOST_COMPONENTS = 48
+_MOST_COMPONENTS = 16
 _SECTIONS = (
     ("contrast", "{action} against {foil}"),
     ("flips", "What would change that"),

@@ -13,10 +13,10 @@ from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
 from trdlab.tabular.mdp import MDP
 from trdlab.tabular.series import averaging
-from trdlab.tabular.solve import evaluate
+from trdlab.tabular.solve import Solution, evaluate
 from trdlab.tabular.table import ExactTable
 
-_ROUNDING = 1e-12  # of the second moment: a variance below is zero
+_ROUNDING = 1e-24  # of a square: what is below comes from rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +41,15 @@ class Spread:
 
 
 def spread(table: ExactTable) -> Spread:
-    """Returns the spread and survival of an exact table, by the same chain as its means.
+    """Returns the spread and survival of an exact table, along the same chain as its means.
 
-    With C = P·(1 − terminated), the second moment of a group of w steps is M_w, where
-    M_1 = E[R²], M_k = E[R²] + 2γ·ΣC·R·μ^π_(k−1) + γ²·C·M^π_(k−1), and μ_k is the mean of k steps.
-    Seen i·w steps ahead it is (γ²C)^(i·w) applied to M_w, and variance is second moment − mean².
-    The residual has M_∞, which solves its own equation with γ² for γ. Survival is p_0 = 1,
-    p_i = C·p^π_(i−1).
+    With C = P·(1 − terminated) and x^π(s) = Σ_a π(a|s) x(s, a), the variance of a sum that goes on
+    with mean μ and variance σ² at the next state is that of what is known one step later, plus
+    what is still unknown then: E[(R + γ(1 − terminated)μ^π(s′) − mean)²] + γ²·C·σ²^π, where σ²^π
+    contains the variance of μ under the policy. Applied w times from nothing it gives a group,
+    without R it looks one step further ahead, and the whole return solves it with γ² for γ.
+    Nothing is taken as a difference of second moment and squared mean, so rounding stays small
+    beside the variance itself. Survival is p_0 = 1, p_i = C·p^π_(i−1).
 
     Args:
         table: the exact table; its policy is followed after the first action.
@@ -59,23 +61,21 @@ def spread(table: ExactTable) -> Spread:
     >>> fair.variance[0, 0].tolist(), fair.survival[0, 0].tolist()
     ([4.0, 0.0, 0.0], [1.0, 0.0, 0.0])
     """
-    mdp, policy, axis = table.mdp, table.solution.policy, table.time_axis
-    gamma, means = axis.gamma, table.decomposition.components
-    average = averaging(policy)
-    group = _group_second_moment(mdp, policy, gamma, axis.width)
-    whole = _return_second_moment(mdp, policy, gamma, average(table.solution.q_values))
-    variance, survival = np.empty(means.shape), np.empty(means.shape)
-    moments = _ahead(mdp, policy, group, gamma**2)
-    rest = _ahead(mdp, policy, whole, gamma**2)
-    running = _ahead(mdp, policy, np.ones(policy.shape), 1.0)
-    for i in range(axis.num_components):
-        explicit, beyond, alive = next(moments), next(rest), next(running)  # [S, A], i·w steps on
-        second = explicit if i < axis.horizon else beyond
-        variance[..., i] = _variance(second, means[..., i])
-        survival[..., i] = alive
+    mdp, axis, solution = table.mdp, table.time_axis, table.solution
+    chain = _Chain(mdp, solution.policy, axis.gamma)
+    return_variance = _return_variance(chain, solution)
+    groups = chain.ahead(*chain.group(axis.width))
+    rest = chain.ahead(solution.q_values, return_variance)
+    alive = chain.survival()
+    variance = np.empty(table.decomposition.components.shape)
+    survival = np.empty(table.decomposition.components.shape)
+    for i in range(axis.num_components):  # each of these is i·w steps ahead
+        group, residual, running = next(groups), next(rest), next(alive)
+        variance[..., i] = group if i < axis.horizon else residual
+        survival[..., i] = running
         for _ in range(axis.width - 1 if i < axis.horizon else 0):
-            next(moments), next(rest), next(running)
-    return Spread(variance, _variance(whole, table.solution.q_values), survival)
+            next(groups), next(rest), next(alive)
+    return Spread(variance, return_variance, survival)
 
 
 def outcomes(
@@ -118,7 +118,7 @@ def outcomes(
         chances = np.bincount(which, mass[taken], len(rewards))
         step = dict(zip(rewards.tolist(), chances.tolist(), strict=True))
         over = 1.0 - float(mass.sum())
-        if over > _ROUNDING:
+        if over > 1e-12:
             step[0.0] = step.get(0.0, 0.0) + over
         result.append(dict(sorted(step.items())))
         going_on = np.where(mdp.terminated, 0.0, mass)
@@ -127,39 +127,56 @@ def outcomes(
     return result
 
 
-def _ahead(mdp: MDP, policy: FloatArray, first: FloatArray, factor: float) -> Iterator[FloatArray]:
-    """Yields x_0 = `first` `[S, A]`, then x_i = factor·C·x^π_(i−1), without an end."""
-    average, ahead = averaging(policy), first
-    while True:
-        yield ahead
-        ahead = factor * mdp.expect(average(ahead))
+class _Chain:
+    """One step of a policy after another, with means and variances `[S, A]`."""
+
+    def __init__(self, mdp: MDP, policy: FloatArray, gamma: float) -> None:
+        self.mdp, self.policy, self.gamma = mdp, policy, gamma
+        self.average = averaging(policy)
+        rows = np.arange(len(mdp.offsets) - 1)
+        self.rows = np.repeat(rows, np.diff(mdp.offsets))  # [K], s·A + a of each transition
+
+    def before(
+        self, mean: FloatArray, variance: FloatArray, *, rewards: FloatArray | float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Returns mean and variance one step earlier, with `rewards [K]` paid on the way."""
+        mdp, gamma = self.mdp, self.gamma
+        mean_of_state = self.average(mean)  # [S]
+        doubt = self.average(variance + (mean - mean_of_state[:, None]) ** 2)  # [S]
+        known = rewards + gamma * ~mdp.terminated * mean_of_state[mdp.next_states]  # [K]
+        earlier = mdp.per_action(mdp.probabilities * known)
+        news = mdp.per_action(mdp.probabilities * (known - earlier.ravel()[self.rows]) ** 2)
+        return earlier, news + gamma**2 * mdp.expect(doubt)
+
+    def group(self, width: int) -> tuple[FloatArray, FloatArray]:
+        """Returns mean and variance of the discounted reward of the next `width` steps."""
+        mean: FloatArray = np.zeros(self.policy.shape)
+        variance = mean
+        for _ in range(width):
+            mean, variance = self.before(mean, variance, rewards=self.mdp.rewards)
+        return mean, variance
+
+    def ahead(self, mean: FloatArray, variance: FloatArray) -> Iterator[FloatArray]:
+        """Yields the variance of a sum that begins now, one step ahead, two, without an end."""
+        while True:
+            yield variance
+            mean, variance = self.before(mean, variance, rewards=0.0)
+
+    def survival(self) -> Iterator[FloatArray]:
+        """Yields the probability that the episode still runs, now, in one step, without an end."""
+        running: FloatArray = np.ones(self.policy.shape)
+        while True:
+            yield running
+            running = self.mdp.expect(self.average(running))
 
 
-def _group_second_moment(mdp: MDP, policy: FloatArray, gamma: float, width: int) -> FloatArray:
-    """Returns `[S, A]`: E[(Σ_(k<w) γ^k R_k)²], from the group's own start."""
-    average = averaging(policy)
-    mean, second = mdp.expected_rewards, _second_moment(mdp, np.zeros(mdp.num_states), gamma)
-    for _ in range(width - 1):
-        follows = average(mean)  # [S]
-        second = _second_moment(mdp, follows, gamma) + gamma**2 * mdp.expect(average(second))
-        mean = mdp.expected_rewards + gamma * mdp.expect(follows)
-    return second
-
-
-def _return_second_moment(
-    mdp: MDP, policy: FloatArray, gamma: float, values: FloatArray
-) -> FloatArray:
-    """Returns `[S, A]`: the second moment of the return, a value with γ² and its own reward."""
-    squares = mdp.rewards**2 + 2.0 * gamma * ~mdp.terminated * mdp.rewards * values[mdp.next_states]
-    return evaluate(mdp.with_rewards(squares), policy, gamma**2).q_values
-
-
-def _second_moment(mdp: MDP, follows: FloatArray, gamma: float) -> FloatArray:
-    """Returns `[S, A]`: E[R² + 2γ·(1 − terminated)·R·follows(s′)]."""
-    cross = 2.0 * gamma * mdp.continuation * mdp.rewards * follows[mdp.next_states]
-    return mdp.per_action(mdp.probabilities * mdp.rewards**2 + cross)
-
-
-def _variance(second: FloatArray, mean: FloatArray) -> FloatArray:
-    variance = second - mean**2
-    return np.where(variance > _ROUNDING * np.abs(second), variance, 0.0)
+def _return_variance(chain: _Chain, solution: Solution) -> FloatArray:
+    """Returns `[S, A]`: the variance of the return, a value with γ² whose reward is the news."""
+    mdp, gamma, q_values = chain.mdp, chain.gamma, solution.q_values
+    values = chain.average(q_values)
+    doubt = chain.average((q_values - values[:, None]) ** 2)  # [S], of the policy's own choice
+    known = mdp.rewards + gamma * ~mdp.terminated * values[mdp.next_states]
+    news = (known - q_values.ravel()[chain.rows]) ** 2
+    news = news + gamma**2 * ~mdp.terminated * doubt[mdp.next_states]
+    news = np.where(news > _ROUNDING * np.maximum(known**2, 1e-300), news, 0.0)
+    return np.maximum(evaluate(mdp.with_rewards(news), chain.policy, gamma**2).q_values, 0.0)

@@ -122,7 +122,7 @@ def test_a_full_disk_is_one_line():
 def test_list_shows_every_map(capsys: pytest.CaptureFixture[str]):
     _, out, _ = run(capsys, "gridworld", "--list")
     _, as_json, _ = run(capsys, "gridworld", "--list", "--json")
-    assert [entry["name"] for entry in json.loads(as_json)][0] == "drone"
+    assert json.loads(as_json)[0]["name"] == "drone"
     for name in ("drone", "patience", "bridge", "tie", "corridor", "loop", "windy"):
         assert f"\n{name}" in out
 

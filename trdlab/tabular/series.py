@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from trdlab.arrays import FloatArray
+from trdlab.arrays import FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.tabular.mdp import MDP, SMALL
@@ -22,20 +22,20 @@ def steps(mdp: MDP, solution: Solution, count: int) -> Iterator[FloatArray]:
     m_i = γ·C·m^π_(i−1); the rest is (γC)^count applied to Q. Each step takes one sparse product for
     all actions, and one for the policy's alone. Ends early when nothing is left to come.
     """
-    gamma = solution.gamma
-    average, follow = averaging(solution.policy), following(mdp, solution.policy)
+    gamma, expect = solution.gamma, mdp.expect
+    average, follow = along(mdp, solution.policy, gamma)
     reward, value = mdp.expected_rewards, average(solution.q_values)  # [S, A], [S]
     if count == 0:
         yield solution.q_values
     for step in range(1, count + 1):
         yield reward
-        ahead = gamma * average(reward)  # [S]
-        if step % _LOOK == 0 and not ahead.any() and not value.any():
-            return
         if step < count:
-            reward, value = mdp.expect(ahead), gamma * follow(value)
+            ahead = gamma * average(reward)  # [S]
+            if step % _LOOK == 0 and not ahead.any() and not value.any():
+                return
+            reward, value = expect(ahead), follow(value)
         else:
-            yield mdp.expect(gamma * value)
+            yield expect(gamma * value)
 
 
 def components(mdp: MDP, solution: Solution, axis: TimeAxis) -> Iterator[FloatArray]:
@@ -98,25 +98,35 @@ def table_gigabytes(mdp: MDP, axis: TimeAxis, dtype: type[np.floating] = np.floa
 
 def averaging(policy: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Returns the map from x `[S, A]` to x^π `[S]`, Σ_a π(a|s) x(s, a)."""
-    if np.isin(policy, (0.0, 1.0)).all():  # one action each: no need to add up
-        chosen = np.arange(len(policy)) * policy.shape[1] + policy.argmax(axis=1)
-        return lambda x: np.asarray(x.ravel().take(chosen))
-    return lambda x: np.asarray((policy * x).sum(axis=1))
+    rows = _rows(policy)
+    if rows is None:
+        return lambda x: np.asarray((policy * x).sum(axis=1))
+    return lambda x: x.ravel().take(rows)
 
 
-def following(mdp: MDP, policy: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Returns the map from v `[S]` to its expectation `[S]` one step along the policy."""
+def along(
+    mdp: MDP, policy: FloatArray, gamma: float
+) -> tuple[Callable[[FloatArray], FloatArray], Callable[[FloatArray], FloatArray]]:
+    """Returns two maps: x `[S, A]` to x^π `[S]`, and v `[S]` to γ·C^π·v, one step ahead."""
+    average = averaging(policy)
     if mdp.num_states <= SMALL:
-        average = averaging(policy)
-        return lambda v: average(mdp.expect(v))
-    if np.isin(policy, (0.0, 1.0)).all():
-        rows = np.arange(mdp.num_states) * mdp.num_actions + policy.argmax(axis=1)
+        return average, lambda v: gamma * average(mdp.expect(v))
+    rows = _rows(policy)
+    if rows is not None:
         chain = mdp.matrix[rows]
+        chain.data *= gamma
     else:
         from scipy.sparse import csr_array
 
         weights = policy[mdp.transition_states, mdp.transition_actions] * mdp.continuation
         pointers = mdp.offsets[:: mdp.num_actions]
         shape = (mdp.num_states, mdp.num_states)
-        chain = csr_array((weights, mdp.next_states, pointers), shape)
-    return lambda v: np.asarray(chain @ v)
+        chain = csr_array((gamma * weights, mdp.next_states, pointers), shape)
+    return average, lambda v: chain @ v
+
+
+def _rows(policy: FloatArray) -> IntArray | None:
+    """Returns `[S]`, s·A + a of the one action that is taken in each state, if it is one."""
+    actions = policy.argmax(axis=1)
+    rows = np.arange(0, policy.size, policy.shape[1]) + actions
+    return rows if (policy.ravel().take(rows) == 1.0).all() else None

@@ -1,0 +1,247 @@
+"""Networks with a head of A × (N+1): the Nature CNN for images, an MLP for everything else."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from trdlab.decomposition import TimeAxis
+from trdlab.deep.layers import (
+    LEAST_SIDE,
+    NATURE_CONVOLUTIONS,
+    convolution,
+    linear,
+    side_after_convolutions,
+)
+from trdlab.errors import InputError
+
+
+class DecompositionNetwork(nn.Module):
+    """Observations in, components `[B, A, N+1]` out.
+
+    `forward` is `components(preprocess(observations))`. The two are apart because a gradient with
+    respect to the observations exists from the floating-point inputs on.
+
+    Args:
+        body: preprocessed inputs to features `[B, F]`.
+        head: features to `[B, A·(N+1)]`, action by action.
+        observation_shape: the shape of one observation.
+        num_actions: A.
+        num_components: N+1.
+    """
+
+    def __init__(
+        self,
+        body: nn.Module,
+        head: nn.Linear,
+        observation_shape: tuple[int, ...],
+        num_actions: int,
+        num_components: int,
+    ) -> None:
+        super().__init__()
+        self.body, self.head = body, head
+        self.observation_shape = observation_shape
+        self.num_actions, self.num_components = num_actions, num_components
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Returns the components `[B, A, N+1]` of observations `[B, ...]`.
+
+        Raises:
+            InputError: the observations have another shape or type than those of the space that
+                the network was built for.
+        """
+        return self.components(self.preprocess(observations))
+
+    def preprocess(self, observations: Tensor) -> Tensor:
+        """Returns observations `[B, ...]` as the floating-point inputs of the first layer."""
+        raise NotImplementedError
+
+    def components(self, inputs: Tensor) -> Tensor:
+        """Returns the components `[B, A, N+1]` of preprocessed inputs."""
+        flat: Tensor = self.head(self.body(inputs))  # [B, ...] -> [B, F] -> [B, A·(N+1)]
+        return flat.reshape(len(flat), self.num_actions, self.num_components)  # [B, A, N+1]
+
+    def _check_shape(self, observations: Tensor) -> None:
+        if tuple(observations.shape[1:]) != self.observation_shape or observations.ndim == 0:
+            expected = ", ".join(map(str, ("B", *self.observation_shape)))
+            raise InputError(
+                f"The observations have shape {tuple(observations.shape)}.",
+                f"This network takes a batch of them: [{expected}].",
+            )
+
+
+class NatureNetwork(DecompositionNetwork):
+    """The convolutional network of Mnih et al. (2015), for stacks of frames as uint8.
+
+    Args:
+        observation_shape: `(C, H, W)`, for Atari (4, 84, 84).
+        num_actions: A.
+        num_components: N+1.
+        rng: what the weights are drawn from.
+        channels_last: whether the weights lie in memory as CPUs and tensor cores read them best.
+
+    Source: Mnih et al. (2015), extended data table 1; head as in the paper, section 4.
+    """
+
+    def __init__(
+        self,
+        observation_shape: tuple[int, int, int],
+        num_actions: int,
+        num_components: int,
+        *,
+        rng: torch.Generator,
+        channels_last: bool = True,
+    ) -> None:
+        channels, height, width = observation_shape
+        rows, columns = side_after_convolutions(height), side_after_convolutions(width)
+        body = nn.Sequential()  # [B, C, H, W]
+        for filters, kernel, stride in NATURE_CONVOLUTIONS:
+            body.append(convolution(channels, filters, kernel, stride, rng)).append(nn.ReLU())
+            channels = filters
+        body.append(nn.Flatten())  # [B, 64·rows·columns], for Atari 3136
+        body.append(linear(channels * rows * columns, 512, rng)).append(nn.ReLU())  # [B, 512]
+        head = linear(512, num_actions * num_components, rng)
+        super().__init__(body, head, observation_shape, num_actions, num_components)
+        self.memory_format = torch.channels_last if channels_last else torch.contiguous_format
+        self.to(memory_format=self.memory_format)  # type: ignore[call-overload]
+
+    def preprocess(self, observations: Tensor) -> Tensor:
+        """Returns `[B, C, H, W]`, from 0 to 1."""
+        self._check_shape(observations)
+        if observations.dtype != torch.uint8:
+            raise InputError(
+                f"The images have type {str(observations.dtype).removeprefix('torch.')}.",
+                "Give uint8 from 0 to 255: the network divides by 255 itself.",
+            )
+        pixels = observations.contiguous(memory_format=self.memory_format)  # [B, C, H, W]
+        return pixels.float().div_(255.0)  # [B, C, H, W]
+
+
+class VectorNetwork(DecompositionNetwork):
+    """A multilayer perceptron, for vectors and for the indices of states.
+
+    Args:
+        observation_shape: of one observation, which is flattened; `()` for an index.
+        num_actions: A.
+        num_components: N+1.
+        hidden: the sizes of the hidden layers.
+        rng: what the weights are drawn from.
+        num_states: where observations are indices, how many there are: they become one-hot.
+        first_state: the least index.
+        scale: what observations are multiplied with.
+    """
+
+    def __init__(
+        self,
+        observation_shape: tuple[int, ...],
+        num_actions: int,
+        num_components: int,
+        *,
+        hidden: Sequence[int],
+        rng: torch.Generator,
+        num_states: int | None = None,
+        first_state: int = 0,
+        scale: float = 1.0,
+    ) -> None:
+        num_inputs = math.prod(observation_shape) if num_states is None else num_states
+        sizes = [num_inputs, *hidden]
+        body = nn.Sequential()
+        for size, following in pairwise(sizes):
+            body.append(linear(size, following, rng)).append(nn.ReLU())
+        head = linear(sizes[-1], num_actions * num_components, rng)
+        super().__init__(body, head, observation_shape, num_actions, num_components)
+        self.num_states, self.first_state, self.scale = num_states, first_state, scale
+
+    def preprocess(self, observations: Tensor) -> Tensor:
+        """Returns `[B, F]`: flattened, or one-hot."""
+        self._check_shape(observations)
+        if self.num_states is None:
+            return observations.flatten(1).float() * self.scale  # [B, F]
+        if observations.is_floating_point():
+            raise InputError(
+                f"The states have type {str(observations.dtype).removeprefix('torch.')}.",
+                "Give whole numbers.",
+            )
+        states = observations.long() - self.first_state  # [B]
+        if states.numel() and not 0 <= int(states.min()) <= int(states.max()) < self.num_states:
+            raise InputError(
+                f"The states run from {int(observations.min())} to {int(observations.max())}.",
+                f"They must lie from {self.first_state} to "
+                f"{self.first_state + self.num_states - 1}.",
+            )
+        return nn.functional.one_hot(states, self.num_states).float()  # [B, S]
+
+
+def build_network(
+    observation_space: gym.Space[Any],
+    num_actions: int,
+    time_axis: TimeAxis,
+    *,
+    seed: int | torch.Generator = 0,
+    hidden: Sequence[int] = (128, 128),
+    channels_last: bool = True,
+) -> DecompositionNetwork:
+    """Returns the network that fits an observation space, with weights drawn from a seed.
+
+    Images (uint8, channels first) are read by the Nature CNN; any other Box is flattened, and a
+    Discrete space becomes one-hot, for an MLP. Weights and biases are uniform in ±1/√fan-in, as
+    PyTorch draws them; its global generator is neither used nor moved.
+
+    Args:
+        observation_space: of one observation.
+        num_actions: A (see `count_actions`).
+        time_axis: its N sets the size of the head.
+        seed: a number, or a generator to go on drawing from.
+        hidden: the sizes of the MLP's hidden layers.
+        channels_last: the CNN's memory layout; it changes speed, not the weights.
+
+    Raises:
+        InputError: the observation space is of another kind, or its images are too small.
+
+    >>> space = gym.spaces.Box(0, 255, (4, 84, 84), np.uint8)
+    >>> network = build_network(space, 4, TimeAxis(0.99, horizon=40))
+    >>> network(torch.zeros(2, 4, 84, 84, dtype=torch.uint8)).shape
+    torch.Size([2, 4, 41])
+    """
+    rng = seed if isinstance(seed, torch.Generator) else torch.Generator().manual_seed(seed)
+    outputs = (num_actions, time_axis.num_components)
+    if isinstance(observation_space, gym.spaces.Discrete):
+        states, first = int(observation_space.n), int(observation_space.start)
+        return VectorNetwork(
+            (), *outputs, hidden=hidden, rng=rng, num_states=states, first_state=first
+        )
+    if not isinstance(observation_space, gym.spaces.Box):
+        raise InputError(
+            f"There is no network for the observation space {observation_space}.",
+            "Use a Box or Discrete one, for example through gymnasium.wrappers.FlattenObservation.",
+        )
+    shape, in_bytes = observation_space.shape, observation_space.dtype == np.uint8
+    if in_bytes and len(shape) == 3:
+        if min(shape[1:]) < LEAST_SIDE:
+            raise InputError(
+                f"The images have shape {shape}.",
+                f"Give (channels, height, width), both sides at least {LEAST_SIDE}.",
+            )
+        return NatureNetwork(shape, *outputs, rng=rng, channels_last=channels_last)
+    return VectorNetwork(
+        shape, *outputs, hidden=hidden, rng=rng, scale=1 / 255 if in_bytes else 1.0
+    )
+
+
+def count_actions(action_space: gym.Space[Any]) -> int:
+    """Returns A.
+
+    Raises:
+        InputError: the actions are not discrete.
+    """
+    if not isinstance(action_space, gym.spaces.Discrete):
+        raise InputError(
+            f"The action space is {action_space}.",
+            "A network has one row of components per action: use a Discrete action space.",
+        )
+    return int(action_space.n)

@@ -1,0 +1,135 @@
+"""The target and the loss: small pure functions on tensors."""
+
+import math
+from typing import Literal
+
+import torch
+from torch import Tensor
+
+from trdlab import bellman
+from trdlab.errors import InputError, TrdlabError
+
+Reduction = Literal["sum", "mean"]
+
+
+def greedy_actions(components: Tensor) -> Tensor:
+    """Returns `[B]`, the actions of largest Σ components, of tied ones the first.
+
+    >>> greedy_actions(torch.tensor([[[1.0, 0.0], [0.0, 3.0], [2.0, 0.0]]])).tolist()
+    [1]
+    """
+    return components.sum(dim=-1).argmax(dim=-1)  # [B, A, N+1] -> [B, A] -> [B]
+
+
+def trd_target(
+    reward: Tensor, discount: Tensor, next_components: Tensor, *, selected_by: Tensor | None = None
+) -> Tensor:
+    """Returns the target components `[B, N+1]`, without gradients.
+
+    Args:
+        reward: `[B]`, the discounted reward of the next w steps.
+        discount: `[B]`, γ^w where the episode goes on, 0 where it terminated.
+        next_components: `[B, A, N+1]` at s_(t+w), of the target network.
+        selected_by: `[B, A, N+1]` at s_(t+w), whose sums choose the next action: those of the
+            online network for double DQN (van Hasselt et al., 2016), by default `next_components`.
+
+    Raises:
+        InputError: the shapes do not fit.
+
+    Source: the paper's Eq. trd-loss (errata P1, P2, P4); `trdlab.bellman.target`.
+
+    >>> following = torch.tensor([[[2.0, 4.0, 6.0], [1.0, 1.0, 1.0]]])
+    >>> trd_target(torch.tensor([1.0]), torch.tensor([0.5]), following)
+    tensor([[1., 1., 5.]])
+    """
+    chooser = next_components if selected_by is None else selected_by
+    if next_components.ndim != 3 or chooser.shape != next_components.shape:
+        raise InputError(
+            f"next_components has shape {tuple(next_components.shape)}, what selects the next "
+            f"action {tuple(chooser.shape)}.",
+            "Give [B, A, N+1] for both.",
+        )
+    with torch.no_grad():
+        chosen = of_actions(next_components, greedy_actions(chooser))  # [B, N+1]
+        target: Tensor = bellman.target(reward, discount, chosen)  # [B, N+1]
+    return target
+
+
+def td_loss(
+    components: Tensor, actions: Tensor, target: Tensor, reduction: Reduction = "sum"
+) -> Tensor:
+    """Returns the squared error of the components, averaged over the batch; a scalar.
+
+    Summed over components, the loss of N = 0 is that of plain DQN, and each component pulls as
+    hard as it, whatever N. The paper takes the mean over components: its loss shrinks by 1/(N+1)
+    against any other loss beside it (errata C5). Alone under Adam the two hardly differ.
+
+    Args:
+        components: `[B, A, N+1]` of the network that learns.
+        actions: `[B]`, whole numbers, what was done.
+        target: `[B, N+1]`, taken as given: no gradient flows into it.
+        reduction: over components, `sum`, or `mean` as in the paper.
+
+    Raises:
+        InputError: the shapes do not fit, or the actions are no whole numbers.
+
+    Source: the paper's Eq. trd-loss.
+
+    >>> online = torch.tensor([[[1.0, 1.0], [0.0, 0.0]]])
+    >>> td_loss(online, torch.tensor([0]), torch.tensor([[2.0, 4.0]]))
+    tensor(10.)
+    """
+    chosen = of_actions(components, actions)  # [B, N+1]
+    if target.shape != chosen.shape:
+        raise InputError(
+            f"The target has shape {tuple(target.shape)}, the components of the actions taken "
+            f"{tuple(chosen.shape)}.",
+            "Give [B, N+1].",
+        )
+    squared_errors = (chosen - target.detach()).square()  # [B, N+1]
+    if reduction == "sum":
+        return squared_errors.sum(dim=1).mean()
+    if reduction == "mean":
+        return squared_errors.mean()
+    raise InputError(f"The reduction is {reduction!r}.", "Use 'sum' or 'mean'.")
+
+
+def of_actions(components: Tensor, actions: Tensor) -> Tensor:
+    """Returns `[B, N+1]`: of components `[B, A, N+1]`, those of the actions `[B]`.
+
+    Raises:
+        InputError: the shapes do not fit, or the actions are no whole numbers.
+    """
+    if actions.is_floating_point() or actions.is_complex() or actions.dtype == torch.bool:
+        raise InputError(
+            f"The actions have type {str(actions.dtype).removeprefix('torch.')}.",
+            "Give whole numbers.",
+        )
+    if components.ndim != 3 or actions.shape != components.shape[:1]:
+        raise InputError(
+            f"The components have shape {tuple(components.shape)}, the actions "
+            f"{tuple(actions.shape)}.",
+            "Give [B, A, N+1] and [B].",
+        )
+    rows = torch.arange(len(actions), device=actions.device)  # [B]
+    return components[rows, actions.long()]  # [B, N+1]
+
+
+def finite_loss(loss: Tensor, update: int) -> float:
+    """Returns a loss as a number, so that it can be looked at before it is learned from.
+
+    Args:
+        loss: a scalar.
+        update: the number of the update, for the message.
+
+    Raises:
+        TrdlabError: it is not finite.
+    """
+    number = loss.item()
+    if not math.isfinite(number):
+        raise TrdlabError(
+            f"The loss is {number} at update {update}.",
+            "Nothing was learned from it: go on from the last checkpoint with a lower learning "
+            "rate, and see that rewards and observations are finite.",
+        )
+    return number

@@ -1,0 +1,75 @@
+"""A network as an Estimator: numpy observations in, decompositions out."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.deep.networks import DecompositionNetwork
+from trdlab.errors import InputError
+from trdlab.estimator import Future
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkEstimator:
+    """Decomposes observations with a network; an Estimator.
+
+    The network is shared, not copied: while it learns, the estimator follows.
+
+    Args:
+        network: moved to `device`.
+        time_axis: what its components mean.
+        future: whose future it was trained to tell.
+        device: where it computes.
+        batch_size: the most observations in one forward pass.
+
+    Raises:
+        InputError: the network has another number of components, or `batch_size` is below 1.
+    """
+
+    network: DecompositionNetwork
+    time_axis: TimeAxis
+    future: Future
+    device: torch.device | str = "cpu"
+    batch_size: int = 256
+
+    def __post_init__(self) -> None:
+        ours, theirs = self.time_axis.num_components, self.network.num_components
+        if ours != theirs:
+            raise InputError(
+                f"The network has {theirs} components, N = {self.time_axis.horizon} needs {ours}.",
+                f"Give the time axis it was trained with, of N = {theirs - 1}.",
+            )
+        if self.batch_size < 1:
+            raise InputError(f"The batch size is {self.batch_size}.", "Choose 1 or more.")
+        self.network.to(self.device)
+
+    def decompose(self, observations: Any) -> RewardDecomposition:
+        """Returns `[B, A, N+1]`, float32, for a batch `[B, ...]` of observations.
+
+        Raises:
+            InputError: the observations have another shape or type than the network takes.
+        """
+        array = np.array(observations)  # [B, ...], a copy that PyTorch may own
+        if array.dtype.kind not in "fiub":
+            raise InputError(
+                f"The observations have type {array.dtype}.",
+                "A network takes arrays of numbers, for example through "
+                "gymnasium.wrappers.FlattenObservation.",
+            )
+        if array.ndim == 0:
+            raise InputError("The observations have shape ().", "Give a batch [B, ...] of them.")
+        was_training = self.network.training
+        self.network.eval()
+        try:
+            with torch.inference_mode():
+                parts = [
+                    self.network(batch.to(self.device)).cpu()  # [≤ batch_size, A, N+1]
+                    for batch in torch.split(torch.from_numpy(array), self.batch_size)
+                ]
+        finally:
+            self.network.train(was_training)
+        components = torch.cat(parts).numpy()  # [B, A, N+1]
+        return RewardDecomposition(components, self.time_axis)

@@ -1,0 +1,216 @@
+"""Updates: against the exact table, against a hand-written DQN, and to the bit."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from trdlab.decomposition import TimeAxis
+from trdlab.deep.estimator import NetworkEstimator
+from trdlab.deep.networks import build_network
+from trdlab.deep.update import Batch, Learner, UpdateSettings
+from trdlab.errors import InputError, TrdlabError
+from trdlab.estimator import Future
+from trdlab.gridworld import Gridworld, load_map
+from trdlab.tabular import exact
+
+AXIS = TimeAxis(0.95, horizon=4)
+VECTOR = gym.spaces.Box(-np.inf, np.inf, (3,), np.float32)
+ATARI = gym.spaces.Box(0, 255, (4, 84, 84), np.uint8)
+
+
+def random_batch(seed: int, size: int = 8, num_actions: int = 2) -> Batch:
+    rng = np.random.default_rng(seed)
+    return Batch(
+        observations=rng.normal(size=(size, 3)).astype(np.float32),
+        actions=rng.integers(0, num_actions, size),
+        rewards=rng.normal(size=size),
+        discounts=np.where(rng.random(size) < 0.3, 0, 0.95),
+        next_observations=rng.normal(size=(size, 3)).astype(np.float32),
+    )
+
+
+def learner(horizon: int = 4, seed: int = 0, **settings: object) -> Learner:
+    network = build_network(VECTOR, 2, TimeAxis(0.95, horizon), seed=seed, hidden=(16,))
+    return Learner(network, UpdateSettings(**settings))
+
+
+def weights(network: nn.Module) -> torch.Tensor:
+    return torch.cat([p.detach().flatten() for p in network.parameters()]).clone()
+
+
+@pytest.fixture(autouse=True)
+def _one_thread():
+    """Networks this small only wait for a second thread, for long where others compute too."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.mark.parametrize("reduction", ["sum", "mean"])
+def test_the_whole_drone_is_learned_exactly(reduction):
+    """Every transition of the drone in one batch: the network reaches the exact table.
+
+    It does where it can settle between two copies of the target network; with 50 updates between
+    them, or with double DQN, whose online network may choose another action at every update, the
+    greedy actions keep flipping, and whole rewards change places.
+    """
+    mdp = Gridworld(load_map("drone")).mdp
+    states = np.repeat(np.arange(mdp.num_states), mdp.num_actions)
+    batch = Batch(
+        observations=states,
+        actions=np.tile(np.arange(mdp.num_actions), mdp.num_states),
+        rewards=mdp.rewards,
+        discounts=AXIS.gamma * ~mdp.terminated,
+        next_observations=mdp.next_states,
+    )
+    network = build_network(gym.spaces.Discrete(mdp.num_states), mdp.num_actions, AXIS)
+    trained = Learner(
+        network, UpdateSettings(learning_rate=1e-3, target_sync_updates=200, reduction=reduction)
+    )
+    for _ in range(2000):
+        trained.update(batch)
+    learned = NetworkEstimator(network, AXIS, Future("the greedy policy of the network"))
+    truth = exact(mdp, AXIS).decomposition
+    error = np.abs(learned.decompose(np.arange(mdp.num_states)).components - truth.components)
+    assert error.max() <= 0.02, error.max(axis=(0, 1))
+
+
+def test_without_explicit_components_updates_are_those_of_dqn():
+    """Ten updates with N = 0, and a DQN written down in full beside it."""
+    ours = learner(horizon=0, learning_rate=1e-2, target_sync_updates=3)
+    online, target = (
+        nn.Sequential(nn.Linear(3, 16), nn.ReLU(), nn.Linear(16, 2)) for _ in range(2)
+    )
+    start = dict(zip(online.state_dict(), ours.q_network.state_dict().values(), strict=True))
+    online.load_state_dict(start)
+    target.load_state_dict(start)
+    adam = torch.optim.Adam(online.parameters(), lr=1e-2)
+    for number in range(1, 11):
+        batch = random_batch(number)
+        observations, actions, rewards, discounts, following = map(torch.as_tensor, batch)
+        with torch.no_grad():
+            goal = rewards.float() + discounts.float() * target(following).max(1).values
+        value = online(observations).gather(1, actions[:, None])[:, 0]
+        loss = nn.functional.mse_loss(value, goal)
+        adam.zero_grad()
+        loss.backward()
+        adam.step()
+        if number % 3 == 0:
+            target.load_state_dict(online.state_dict())
+        metrics = ours.update(batch)
+        assert metrics.loss == pytest.approx(loss.item(), abs=1e-6)
+        assert metrics.mean_value == pytest.approx(value.mean().item(), abs=1e-6)
+    torch.testing.assert_close(weights(ours.q_network), weights(online), atol=1e-6, rtol=0)
+
+
+@pytest.mark.parametrize("settings", [{}, {"double": True}, {"bf16": True}])
+def test_the_same_seed_learns_the_same_to_the_bit(settings):
+    runs = [learner(seed=seed, **settings) for seed in (3, 3, 4)]
+    for run in runs:
+        for seed in range(5):
+            run.update(random_batch(seed))
+    one, same, other = (weights(run.q_network) for run in runs)
+    assert torch.equal(one, same)
+    assert not torch.equal(one, other)
+
+
+def test_the_target_network_follows_every_few_updates():
+    run = learner(target_sync_updates=3)
+    start = weights(run.target_network)
+    for number in range(1, 7):
+        run.update(random_batch(number))
+        synced = torch.equal(weights(run.q_network), weights(run.target_network))
+        assert synced == (number % 3 == 0)
+        assert torch.equal(weights(run.target_network), start) == (number < 3)
+    assert run.num_updates == 6
+
+
+def test_a_loss_that_is_not_finite_changes_nothing():
+    run = learner()
+    run.update(random_batch(0))
+    before = weights(run.q_network)
+    broken = random_batch(1)
+    broken.rewards[2] = np.nan
+    with pytest.raises(TrdlabError, match=r"loss is nan at update 2\b"):
+        run.update(broken)
+    assert torch.equal(weights(run.q_network), before)
+    assert run.num_updates == 1
+
+
+def test_a_resumed_learner_is_the_uninterrupted_one_to_the_bit():
+    whole, first = learner(target_sync_updates=4), learner(target_sync_updates=4)
+    for seed in range(6):
+        whole.update(random_batch(seed))
+        first.update(random_batch(seed))
+    second = learner(target_sync_updates=4, seed=9)
+    second.load_state_dict(first.state_dict())
+    for seed in range(6, 12):
+        whole.update(random_batch(seed))
+        second.update(random_batch(seed))
+    assert second.num_updates == 12
+    assert torch.equal(weights(whole.q_network), weights(second.q_network))
+    assert torch.equal(weights(whole.target_network), weights(second.target_network))
+
+
+def test_other_settings_are_not_resumed():
+    state = learner(target_sync_updates=4).state_dict()
+    with pytest.raises(InputError, match=r"target_sync_updates 4 there, 5 here"):
+        learner(target_sync_updates=5).load_state_dict(state)
+
+
+@pytest.mark.parametrize("double", [False, True])
+def test_bf16_gives_nearly_the_same_gradients(double):
+    """Autocast caches cast weights: those of the target's side must not cut off the gradient."""
+    gradients = []
+    for bf16 in (False, True):
+        network = build_network(ATARI, 2, AXIS)
+        run = Learner(network, UpdateSettings(double=double, bf16=bf16))
+        rng = np.random.default_rng(0)
+        images = rng.integers(0, 256, (2, 4, *ATARI.shape), dtype=np.uint8)
+        run.update(Batch(images[0], [0, 1, 1, 0], np.ones(4), np.full(4, 0.9), images[1]))
+        gradients.append(torch.cat([p.grad.flatten() for p in network.parameters()]))
+        assert all(p.dtype == torch.float32 for p in network.parameters())
+    similarity = nn.functional.cosine_similarity(*gradients, dim=0)
+    assert similarity > 0.99
+    assert (gradients[1].norm() / gradients[0].norm()).item() == pytest.approx(1, rel=0.05)
+
+
+def test_read_only_arrays_and_tensors_are_taken():
+    frozen = random_batch(0)
+    for array in frozen:
+        array.setflags(write=False)
+    from_arrays, from_tensors = learner(), learner()
+    from_arrays.update(frozen)
+    from_tensors.update(Batch(*map(torch.as_tensor, random_batch(0))))
+    assert torch.equal(weights(from_arrays.q_network), weights(from_tensors.q_network))
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"actions": np.zeros(8)}, r"actions have type float64"),
+        ({"actions": np.zeros(7, np.int64)}, r"actions \(7,\)"),
+        ({"rewards": np.zeros((8, 1))}, r"reward has shape \(8, 1\)"),
+        ({"observations": np.zeros((8, 4), np.float32)}, r"shape \(8, 4\).*\[B, 3\]"),
+    ],
+)
+def test_a_batch_that_does_not_fit_is_refused(changed, message):
+    with pytest.raises(InputError, match=message):
+        learner().update(random_batch(0)._replace(**changed))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"learning_rate": 0.0}, r"learning rate is 0\.0"),
+        ({"learning_rate": float("nan")}, r"learning rate is nan"),
+        ({"target_sync_updates": 0}, r"target_sync_updates is 0"),
+        ({"reduction": "max"}, r"reduction is 'max'"),
+    ],
+)
+def test_settings_out_of_range_are_refused(settings, message):
+    with pytest.raises(InputError, match=message):
+        UpdateSettings(**settings)

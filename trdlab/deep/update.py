@@ -1,0 +1,207 @@
+"""One update: a batch of windows in, a better network out."""
+
+from copy import deepcopy
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from trdlab.deep.loss import Reduction, finite_loss, of_actions, td_loss, trd_target
+from trdlab.deep.networks import DecompositionNetwork
+from trdlab.errors import InputError
+
+
+class Windows(Protocol):
+    """What an update reads of a batch of B windows of w steps, numpy arrays or tensors."""
+
+    @property
+    def observations(self) -> Any:
+        """`[B, ...]`: s_t."""
+
+    @property
+    def actions(self) -> Any:
+        """`[B]`: a_t, whole numbers from 0 to A−1."""
+
+    @property
+    def rewards(self) -> Any:
+        """`[B]`: Σ_(i<w) γ^i R_(t+i)."""
+
+    @property
+    def discounts(self) -> Any:
+        """`[B]`: γ^w, or 0 where the episode terminated within the window."""
+
+    @property
+    def next_observations(self) -> Any:
+        """`[B, ...]`: s_(t+w), or anything where the episode terminated."""
+
+
+class Batch(NamedTuple):
+    """The plainest `Windows`."""
+
+    observations: Any
+    actions: Any
+    rewards: Any
+    discounts: Any
+    next_observations: Any
+
+
+class Metrics(NamedTuple):
+    """What an update tells of itself.
+
+    Args:
+        loss: see `td_loss`.
+        mean_value: the mean Q-value of the actions taken.
+    """
+
+    loss: float
+    mean_value: float
+
+
+@dataclass(frozen=True)
+class UpdateSettings:
+    """How to learn; the defaults are the paper's (Appendix B).
+
+    Args:
+        learning_rate: of Adam.
+        target_sync_updates: the updates, not agent steps, between two copies of the network to
+            the target network (errata C6).
+        reduction: over components, see `td_loss`.
+        double: whether the online network chooses the next action (double DQN).
+        bf16: whether the networks compute in bfloat16, which keeps two or three digits; weights,
+            targets and the loss stay float32.
+
+    Raises:
+        InputError: a value is out of its range.
+    """
+
+    learning_rate: float = 1e-4
+    target_sync_updates: int = 1000
+    reduction: Reduction = "sum"
+    double: bool = False
+    bf16: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.learning_rate < float("inf"):
+            raise InputError(f"The learning rate is {self.learning_rate}.", "Choose one above 0.")
+        if self.target_sync_updates < 1:
+            raise InputError(
+                f"target_sync_updates is {self.target_sync_updates}.",
+                "Copy the network every 1 or more updates.",
+            )
+        if self.reduction not in ("sum", "mean"):
+            raise InputError(f"The reduction is {self.reduction!r}.", "Use 'sum' or 'mean'.")
+
+
+class Learner:
+    """A network that learns, its target network, and the optimiser.
+
+    Args:
+        q_network: what learns; moved to `device`.
+        settings: how.
+        device: where.
+
+    Source: Mnih et al. (2015) with the paper's Eq. trd-loss.
+    """
+
+    def __init__(
+        self,
+        q_network: DecompositionNetwork,
+        settings: UpdateSettings | None = None,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        self.settings = settings or UpdateSettings()
+        self.device = torch.device(device)
+        self.q_network = q_network.to(self.device)
+        self.target_network = deepcopy(self.q_network).requires_grad_(False)
+        self.optimizer = torch.optim.Adam(
+            self.q_network.parameters(),
+            lr=self.settings.learning_rate,
+            fused=self.device.type in ("cpu", "cuda"),
+        )
+        self.num_updates = 0
+
+    def update(self, batch: Windows) -> Metrics:
+        """Learns from a batch once, and copies the target network when it is due.
+
+        Raises:
+            TrdlabError: the loss is not finite; nothing has changed then.
+            InputError: the shapes or types do not fit.
+        """
+        settings = self.settings
+        observations = self._tensor(batch.observations)  # [B, ...]
+        actions = self._tensor(batch.actions)  # [B]
+        next_observations = self._tensor(batch.next_observations)  # [B, ...]
+
+        with torch.no_grad():
+            following = self._components(self.target_network, next_observations)  # [B, A, N+1]
+            chooser = (
+                self._components(self.q_network, next_observations) if settings.double else None
+            )  # [B, A, N+1]
+        target = trd_target(
+            self._tensor(batch.rewards),
+            self._tensor(batch.discounts),
+            following,
+            selected_by=chooser,
+        )  # [B, N+1]
+        components = self._components(self.q_network, observations)  # [B, A, N+1]
+        loss = td_loss(components, actions, target, settings.reduction)  # scalar
+        number = finite_loss(loss, self.num_updates + 1)
+
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        self.optimizer.step()
+
+        self.num_updates += 1
+        if self.num_updates % settings.target_sync_updates == 0:
+            self.sync_target()
+        values = of_actions(components.detach(), actions).sum(dim=1)  # [B]
+        return Metrics(number, float(values.mean()))
+
+    def sync_target(self) -> None:
+        """Copies the network to the target network."""
+        self.target_network.load_state_dict(self.q_network.state_dict())
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns everything that later updates depend on, for a checkpoint."""
+        return {
+            "settings": asdict(self.settings),
+            "num_updates": self.num_updates,
+            "q_network": self.q_network.state_dict(),
+            "target_network": self.target_network.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Goes on where `state_dict` was taken, to the bit.
+
+        Raises:
+            InputError: it was taken with other settings.
+        """
+        if state["settings"] != asdict(self.settings):
+            changed = [
+                f"{name} {state['settings'].get(name)} there, {value} here"
+                for name, value in asdict(self.settings).items()
+                if state["settings"].get(name) != value
+            ]
+            raise InputError(f"The settings differ: {'; '.join(changed)}.", "Use the same ones.")
+        self.num_updates = state["num_updates"]
+        self.q_network.load_state_dict(state["q_network"])
+        self.target_network.load_state_dict(state["target_network"])
+        self.optimizer.load_state_dict(state["optimizer"])
+
+    def _components(self, network: DecompositionNetwork, observations: Tensor) -> Tensor:
+        """Returns `[B, A, N+1]`, float32.
+
+        A context of its own for each call: autocast caches the weights it has cast, and those of a
+        call without gradients must not serve one with.
+        """
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.settings.bf16):
+            components: Tensor = network(observations)
+        return components.float()
+
+    def _tensor(self, array: Any) -> Tensor:
+        if isinstance(array, np.ndarray) and not array.flags.writeable:
+            array = array.copy()  # PyTorch warns of memory it could write to
+        return torch.as_tensor(array, device=self.device)

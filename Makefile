@@ -22,7 +22,7 @@ imports: $(VENV)/installed-tests
 	$(BIN)/lint-imports
 
 unit: $(VENV)/installed-tests
-	$(BIN)/pytest -n 2
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2  # one thread for each worker
 
 docs: $(VENV)/installed-tests
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

@@ -4,7 +4,8 @@ The agent acts at random, its frames are 84×84 grey ones of ale-py's own vector
 skip 4, up to 30 no-ops, then the button that starts a game; and it presses that button again with
 every tenth action, lest Breakout stands still after a lost ball. A bare update is plain torch: the
 Nature CNN (18 actions), batch 32, forward and backward, forward of the target network, fused Adam.
-It takes turns with the sampling of 32 stacks of four frames: machines drift, ratios hold.
+It takes turns with the sampling of 32 windows with stacks of four frames, as in training, so that
+the memory is read from behind cold caches; machines drift, ratios hold.
 
     python benchmarks/replay.py             # 20 000 steps of each game
     python benchmarks/replay.py 2000        # fewer
@@ -14,6 +15,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
+from itertools import chain
 
 import numpy as np
 import torch
@@ -77,6 +79,10 @@ def clock(function: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
+def ratio(above: list[float], below: list[float]) -> float:
+    return statistics.median(a / b for a, b in zip(above, below, strict=True))
+
+
 def network(actions: int = 18) -> nn.Module:
     return nn.Sequential(
         *(nn.Conv2d(STACK, 32, 8, 4), nn.ReLU(), nn.Conv2d(32, 64, 4, 2), nn.ReLU()),
@@ -122,25 +128,24 @@ def main(steps: int) -> None:
         frames = play(game, steps, memories)
         storing, reading = per_frame(frames)
         sampling: list[list[float]] = [[] for _ in WIDTHS]
-        updating = []
+        updating: list[list[float]] = [[] for _ in WIDTHS]
         for turn in range(ROUNDS + 3):  # the first three do not count
-            batch = memories[0].sample(BATCH, rng)
-            taken = clock(lambda b=batch: update(b))
-            for memory, seconds in zip(memories, sampling, strict=True):
-                again = clock(lambda m=memory: m.sample(BATCH, rng))
+            for memory, sampled, updated in zip(memories, sampling, updating, strict=True):
+                start = time.perf_counter()
+                batch = memory.sample(BATCH, rng)
+                middle = time.perf_counter()
+                update(batch)
                 if turn >= 3:
-                    seconds.append(again)
-            if turn >= 3:
-                updating.append(taken)
+                    sampled.append(middle - start)
+                    updated.append(time.perf_counter() - middle)
         sizes.append(memories[0].bytes_per_transition)
         shares = " ".join(
-            f"{1e3 * statistics.median(seconds):5.2f} "
-            f"{statistics.median(a / b for a, b in zip(seconds, updating, strict=True)):5.1%}"
-            for seconds in sampling
+            f"{1e3 * statistics.median(sampled):5.2f} {ratio(sampled, updated):5.1%}"
+            for sampled, updated in zip(sampling, updating, strict=True)
         )
         print(
             f"{game:14} | {sizes[-1]:10.0f} | {storing:5.1f}   {reading:5.1f} | {shares} | "
-            f"{1e3 * statistics.median(updating):6.1f}",
+            f"{1e3 * statistics.median(chain(*updating)):6.1f}",
             flush=True,
         )
     mean, told = statistics.fmean(sizes), memory_needed(1_000_000, (84, 84)) / 1e9

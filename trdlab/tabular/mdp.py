@@ -128,12 +128,12 @@ class MDP:
             start=start,
         )
 
-    @property
+    @cached_property
     def num_states(self) -> int:
         """S."""
         return (len(self.offsets) - 1) // self.num_actions
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """S and A."""
         return self.num_states, self.num_actions
@@ -188,7 +188,8 @@ class MDP:
         """Returns `[S, A]`: the expected `values [S]` of the next state, 0 once terminated."""
         if self.num_states <= SMALL:
             return self.per_action(self.continuation * values[self.next_states])
-        return np.asarray((self.matrix @ values).reshape(self.num_states, self.num_actions))
+        ahead: FloatArray = self.matrix @ values
+        return ahead.reshape(self.shape)
 
     def per_state(self, per_transition: FloatArray) -> FloatArray:
         """Returns `[S]`: the sums of `per_transition [K]` over all actions of a state."""

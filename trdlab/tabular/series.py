@@ -98,20 +98,17 @@ def table_gigabytes(mdp: MDP, axis: TimeAxis, dtype: type[np.floating] = np.floa
 
 def averaging(policy: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Returns the map from x `[S, A]` to x^π `[S]`, Σ_a π(a|s) x(s, a)."""
-    rows = _rows(policy)
-    if rows is None:
-        return lambda x: np.asarray((policy * x).sum(axis=1))
-    return lambda x: x.ravel().take(rows)
+    return _averaging(policy, _rows(policy))
 
 
 def along(
     mdp: MDP, policy: FloatArray, gamma: float
 ) -> tuple[Callable[[FloatArray], FloatArray], Callable[[FloatArray], FloatArray]]:
     """Returns two maps: x `[S, A]` to x^π `[S]`, and v `[S]` to γ·C^π·v, one step ahead."""
-    average = averaging(policy)
+    rows = _rows(policy)
+    average = _averaging(policy, rows)
     if mdp.num_states <= SMALL:
         return average, lambda v: gamma * average(mdp.expect(v))
-    rows = _rows(policy)
     if rows is not None:
         chain = mdp.matrix[rows]
         chain.data *= gamma
@@ -123,6 +120,12 @@ def along(
         shape = (mdp.num_states, mdp.num_states)
         chain = csr_array((gamma * weights, mdp.next_states, pointers), shape)
     return average, lambda v: chain @ v
+
+
+def _averaging(policy: FloatArray, rows: IntArray | None) -> Callable[[FloatArray], FloatArray]:
+    if rows is None:
+        return lambda x: np.asarray((policy * x).sum(axis=1))
+    return lambda x: x.ravel().take(rows)
 
 
 def _rows(policy: FloatArray) -> IntArray | None:

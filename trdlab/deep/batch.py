@@ -13,6 +13,8 @@ from trdlab.arrays import IntArray
 class Batch:
     """K windows of w steps: K the batch, k the frames in a stack.
 
+    The two stacks of observations may be views of the same frames: read them, write elsewhere.
+
     Args:
         observations: `[K, k, ...]`, the stack at s_t (`[K, ...]` where there are no stacks).
         actions: `[K]`, a_t, int64.

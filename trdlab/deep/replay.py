@@ -16,6 +16,7 @@ from trdlab.errors import InputError, TrdlabError, closest
 __all__ = ["Batch", "Padding", "ReplayBuffer"]
 
 Padding = Literal["reset", "zero"]
+Images = npt.NDArray[Any]
 
 
 class ReplayBuffer:
@@ -202,20 +203,13 @@ class ReplayBuffer:
     def windows(self, places: IntArray) -> Batch:
         """Returns the windows that begin at these `places [K]` in the memory."""
         rewards, steps, terminated = self._ring.outcomes(places, self.gamma)
-        frame = self._ring.fields["frame"][places]
-        age = self._ring.fields["age"][places].astype(np.int64)
-        pair = [self._stacked(frame, age), self._stacked(frame + steps, age + steps)]
-        numbers = np.stack(pair)  # [2, K, k]
-        envs = np.broadcast_to((places % self.num_envs)[:, None], numbers.shape)
-        read = self._frames.read(envs.ravel(), numbers.ravel())  # [2·K·k, *shape]
-        axis = () if self.stack is None else (self.stack,)
-        stacks = read.reshape(2, len(places), *axis, *self._frames.shape)
+        observations, next_observations = self._observations(places, steps)
         return Batch(
-            observations=stacks[0],
+            observations=observations,
             actions=self._ring.fields["action"][places].astype(np.int64),
             rewards=rewards.astype(np.float32),
             discounts=np.where(terminated, 0.0, self.gamma**self.width).astype(np.float32),
-            next_observations=stacks[1],
+            next_observations=next_observations,
             steps=steps,
             indices=places,
             extras={name: values[places] for name, values in self._ring.extras.items()},
@@ -250,11 +244,27 @@ class ReplayBuffer:
         for name, array in self._arrays().items():
             array[...] = state["arrays"][name]
 
-    def _stacked(self, frame: IntArray, age: IntArray) -> IntArray:
-        """Returns `[K, k]`: the numbers of the frames in the stacks that end with `frame [K]`."""
-        back = np.arange((self.stack or 1) - 1, -1, -1)
+    def _observations(self, places: IntArray, steps: IntArray) -> tuple[Images, Images]:
+        """Returns `[K, k, ...]` twice: the stacks at s_t, and so many steps `[K]` later."""
+        stack = self.stack or 1
+        begin, age = (self._ring.fields[name][places].astype(np.int64) for name in ("frame", "age"))
+        end, end_age = begin + steps, age + steps
+        if self.width < stack and (steps == self.width).all():  # each frame they share, read once
+            numbers = self._stacked(end, end_age, stack + self.width)
+        else:
+            pair = self._stacked(begin, age, stack), self._stacked(end, end_age, stack)
+            numbers = np.concatenate(pair, axis=1)  # [K, 2·k]
+        envs = np.broadcast_to((places % self.num_envs)[:, None], numbers.shape)
+        frames = self._frames.read(envs.ravel(), numbers.ravel())
+        rows = frames.reshape(*numbers.shape, *self._frames.shape)
+        if self.stack is None:
+            return rows[:, 0], rows[:, -1]
+        return rows[:, :stack], rows[:, -stack:]
+
+    def _stacked(self, frame: IntArray, age: IntArray, size: int) -> IntArray:
+        """Returns `[K, size]`: the numbers of the last `size` frames, up to `frame [K]`."""
         first = (frame - age)[:, None]
-        numbers = frame[:, None] - back
+        numbers = frame[:, None] - np.arange(size - 1, -1, -1)
         return np.where(numbers < first, first if self.padding == "reset" else BLANK, numbers)
 
     def _arrays(self) -> dict[str, npt.NDArray[Any]]:

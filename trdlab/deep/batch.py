@@ -1,4 +1,4 @@
-"""What the replay memory gives to an update."""
+"""What the replay memory is given by a step, and gives to an update."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trdlab.arrays import IntArray
+from trdlab.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,3 +39,18 @@ class Batch:
 
     def __len__(self) -> int:
         return len(self.actions)
+
+
+def checked(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    """Returns an array that has this shape `[B, ...]`.
+
+    Raises:
+        InputError: it has another one.
+    """
+    array = np.asarray(values)
+    if array.shape != shape:
+        raise InputError(
+            f"The {name} have shape {array.shape}, not {shape}.",
+            "Give one entry for each environment; of a stack, the newest frame alone.",
+        )
+    return array

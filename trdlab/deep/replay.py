@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trdlab.arrays import IntArray
-from trdlab.deep.batch import Batch
+from trdlab.deep.batch import Batch, checked
 from trdlab.deep.frames import BLANK, FrameStore, chunk_frames, compresses
 from trdlab.deep.ring import RUNS, TERMINATED, TRUNCATED, Ring
 from trdlab.errors import InputError, TrdlabError, closest
@@ -281,14 +281,7 @@ class ReplayBuffer:
     def _checked(
         self, name: str, values: npt.ArrayLike, shape: tuple[int, ...] = ()
     ) -> npt.NDArray[Any]:
-        """Returns the array if it has one entry of this shape for each environment."""
-        array = np.asarray(values)
-        if array.shape != (self.num_envs, *shape):
-            raise InputError(
-                f"The {name} have shape {array.shape}, not {(self.num_envs, *shape)}.",
-                "Give one entry for each environment; of a stack, the newest frame alone.",
-            )
-        return array
+        return checked(name, values, (self.num_envs, *shape))
 
     def _checked_frames(self, name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
         frames, dtype = self._checked(name, values, self._frames.shape), self._frames.dtype

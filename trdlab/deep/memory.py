@@ -15,7 +15,7 @@ from trdlab.errors import TrdlabError
 
 COMPRESSED = 0.29
 """The part of an 84×84 Atari frame that compression leaves in an unfavourable game (measured by
-`benchmarks/replay.py`: 0.06 for Breakout, 0.27 for Ms. Pac-Man)."""
+`benchmarks/replay.py`: 0.06 for Breakout, 0.26 for Ms. Pac-Man)."""
 
 
 def memory_needed(

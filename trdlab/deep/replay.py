@@ -156,9 +156,10 @@ class ReplayBuffer:
         """
         frames = self._checked_frames("observations", observations)
         next_frames = self._checked_frames("next observations", next_observations)
-        actions, rewards = self._checked("actions", actions), self._checked("rewards", rewards)
-        ends = self._checked("terminated", terminated).astype(np.bool_)
-        cuts = self._checked("truncated", truncated).astype(np.bool_)
+        each = (self.num_envs,)
+        actions, rewards = checked("actions", actions, each), checked("rewards", rewards, each)
+        ends = checked("terminated", terminated, each).astype(np.bool_)
+        cuts = checked("truncated", truncated, each).astype(np.bool_)
         endings = np.where(ends, TERMINATED, np.where(cuts, TRUNCATED, RUNS))  # [B]
         goes_on = np.broadcast_to(goes_on, self.num_envs)
         extras = self._checked_extras(extras or {})
@@ -278,13 +279,9 @@ class ReplayBuffer:
         }
         return {name: getattr(self, name) for name in names} | self._frames.settings | extras
 
-    def _checked(
-        self, name: str, values: npt.ArrayLike, shape: tuple[int, ...] = ()
-    ) -> npt.NDArray[Any]:
-        return checked(name, values, (self.num_envs, *shape))
-
     def _checked_frames(self, name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
-        frames, dtype = self._checked(name, values, self._frames.shape), self._frames.dtype
+        dtype = self._frames.dtype
+        frames = checked(name, values, (self.num_envs, *self._frames.shape))
         if not np.can_cast(frames.dtype, dtype, "safe"):
             raise InputError(
                 f"The {name} have type {frames.dtype}, and would not fit into {dtype} exactly.",
@@ -300,6 +297,6 @@ class ReplayBuffer:
                 "Give those that it was made for.",
             )
         return {
-            name: self._checked(name, values, self._ring.extras[name].shape[1:])
+            name: checked(name, values, (self.num_envs, *self._ring.extras[name].shape[1:]))
             for name, values in extras.items()
         }

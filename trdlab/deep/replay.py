@@ -173,8 +173,8 @@ class ReplayBuffer:
             self._ring.add(env, frame, age, action, reward, ending, row)
             self._frames.append(env, next_frames[env])
             self._ages[env] = age + 1 if ending == RUNS or goes_on[env] else -1
-            oldest = self._ring.oldest_frame(env)
-            self._frames.forget_before(env, oldest - (self.stack or 1) + 1)  # its stack stays
+            stacked = self._ring.oldest_frame(env) - (self.stack or 1) + 1
+            self._frames.forget_before(env, stacked)
 
     def interrupt(self) -> None:
         """Truncates the running episodes where they stand: the environments are begun afresh."""
@@ -219,8 +219,8 @@ class ReplayBuffer:
     def state_dict(self) -> dict[str, Any]:
         """Returns everything as plain numbers, arrays and bytes: a later run samples the same.
 
-        The blocks under `frames`, `sealed` never change once they are there: one that has been
-        saved under its name need not be saved again. All the rest is small. Arrays are copies.
+        A block under `frames`, `sealed` never changes: saved once under its name, it need not be
+        saved again. All the rest is small, and copied.
         """
         return {
             "settings": self._settings(),

@@ -1,0 +1,1 @@
+"""Atari games, preprocessed as agents are trained on them."""

@@ -1,0 +1,99 @@
+"""What a trainer asks of the environments it acts in."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import gymnasium as gym
+import numpy.typing as npt
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.errors import TrdlabError
+
+Frames = npt.NDArray[Any]
+Padding = Literal["reset", "zero"]
+
+
+class NotReproducible(TrdlabError):  # noqa: N818  it says what an environment is, not what failed
+    """An environment did something else when the same seed and actions were given again."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What one step of B environments led to.
+
+    Args:
+        frames: `[B, ...]`, the newest frame of what the step led to; where an episode ended, its
+            true last one.
+        rewards: `[B]` as float64, as the environment pays them.
+        terminated: `[B]`, whether the episode ended for good.
+        truncated: `[B]`, whether it was cut off; never both.
+        life_lost: `[B]`, whether a life was lost and the episode goes on.
+        following: `[B, ...]`, the frame that the next action is chosen at: that of `frames`, or
+            the first one of the next episode where one ended.
+    """
+
+    frames: Frames
+    rewards: FloatArray
+    terminated: BoolArray
+    truncated: BoolArray
+    life_lost: BoolArray
+    following: Frames
+
+    @property
+    def ended(self) -> BoolArray:
+        """`[B]`: where an episode ended, and the next one has begun."""
+        return self.terminated | self.truncated
+
+
+class Environments(Protocol):
+    """B environments that step together and begin their next episode by themselves.
+
+    Attributes:
+        num_envs: B.
+        observation_space: of one frame: a Box (images channels first) or a Discrete space.
+        num_actions: A; the actions given to `step` run from 0 to A − 1.
+        first_action: what the environment itself calls action 0.
+        action_names: A names, where the environment tells them, else empty.
+        stack: how many frames an observation holds; None where it is one frame without an axis
+            for the stack.
+        padding: what stands in a stack before the first frame (see `ReplayBuffer`).
+        time_limit: the agent steps after which every episode is truncated, if that is known.
+        frame_skip: how many frames of the environment make one agent step.
+        frames_per_second: of the environment as people see it, if it is known.
+    """
+
+    num_envs: int
+    observation_space: gym.Space[Any]
+    num_actions: int
+    first_action: int
+    action_names: tuple[str, ...]
+    stack: int | None
+    padding: Padding
+    time_limit: int | None
+    frame_skip: int
+    frames_per_second: float | None
+
+    def reset(self) -> Frames:
+        """Begins an episode in every environment, and returns their first frames `[B, ...]`."""
+        ...
+
+    def step(self, actions: IntArray) -> Step:
+        """Takes actions `[B]`; where an episode ends, the next one begins in the same call."""
+        ...
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns what is needed to restore the environments: plain numbers and small arrays."""
+        ...
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> Frames:
+        """Restores to the bit; returns `[B, ...]`, the frames the next action is chosen at.
+
+        Raises:
+            NotReproducible: an environment does not do again what it did.
+        """
+        ...
+
+    def close(self) -> None:
+        """Lets go of what the environments hold."""
+        ...

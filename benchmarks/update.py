@@ -21,7 +21,8 @@ from torch import nn
 
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.networks import build_network
-from trdlab.deep.update import Batch, Learner, UpdateSettings, Windows
+from trdlab.deep.settings import UpdateSettings
+from trdlab.deep.update import Batch, Learner, Windows
 
 BATCH, HORIZON, SHAPE = 32, 40, (4, 84, 84)
 

@@ -9,7 +9,8 @@ from torch import nn
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.estimator import NetworkEstimator
 from trdlab.deep.networks import build_network
-from trdlab.deep.update import Batch, Learner, UpdateSettings
+from trdlab.deep.settings import UpdateSettings
+from trdlab.deep.update import Batch, Learner
 from trdlab.errors import InputError, TrdlabError
 from trdlab.estimator import Future
 from trdlab.gridworld import Gridworld, load_map

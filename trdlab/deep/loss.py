@@ -1,15 +1,13 @@
 """The target and the loss: small pure functions on tensors."""
 
 import math
-from typing import Literal
 
 import torch
 from torch import Tensor
 
 from trdlab import bellman
+from trdlab.deep.settings import Reduction
 from trdlab.errors import InputError, TrdlabError
-
-Reduction = Literal["sum", "mean"]
 
 
 def greedy_actions(components: Tensor) -> Tensor:

@@ -1,15 +1,16 @@
 """One update: a batch of windows in, a better network out."""
 
 from copy import deepcopy
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from trdlab.deep.loss import Reduction, finite_loss, of_actions, td_loss, trd_target
+from trdlab.deep.loss import finite_loss, of_actions, td_loss, trd_target
 from trdlab.deep.networks import DecompositionNetwork
+from trdlab.deep.settings import UpdateSettings
 from trdlab.errors import InputError
 
 
@@ -57,41 +58,6 @@ class Metrics(NamedTuple):
 
     loss: float
     mean_value: float
-
-
-@dataclass(frozen=True)
-class UpdateSettings:
-    """How to learn; the defaults are the paper's (Appendix B).
-
-    Args:
-        learning_rate: of Adam.
-        target_sync_updates: the updates, not agent steps, between two copies of the network to
-            the target network (errata C6).
-        reduction: over components, see `td_loss`.
-        double: whether the online network chooses the next action (double DQN).
-        bf16: whether the networks compute in bfloat16, which keeps two or three digits; weights,
-            targets and the loss stay float32.
-
-    Raises:
-        InputError: a value is out of its range.
-    """
-
-    learning_rate: float = 1e-4
-    target_sync_updates: int = 1000
-    reduction: Reduction = "sum"
-    double: bool = False
-    bf16: bool = False
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.learning_rate < float("inf"):
-            raise InputError(f"The learning rate is {self.learning_rate}.", "Choose one above 0.")
-        if self.target_sync_updates < 1:
-            raise InputError(
-                f"target_sync_updates is {self.target_sync_updates}.",
-                "Copy the network every 1 or more updates.",
-            )
-        if self.reduction not in ("sum", "mean"):
-            raise InputError(f"The reduction is {self.reduction!r}.", "Use 'sum' or 'mean'.")
 
 
 class Learner:

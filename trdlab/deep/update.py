@@ -1,10 +1,12 @@
 """One update: a batch of windows in, a better network out."""
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import asdict
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor
 
@@ -129,21 +131,32 @@ class Learner:
         """Copies the network to the target network."""
         self.target_network.load_state_dict(self.q_network.state_dict())
 
+    def set_learning_rate(self, learning_rate: float) -> None:
+        """Sets Adam's learning rate for the updates to come."""
+        for group in self.optimizer.param_groups:
+            group["lr"] = learning_rate
+
     def state_dict(self) -> dict[str, Any]:
-        """Returns everything that later updates depend on, for a checkpoint."""
+        """Returns everything that later updates depend on, as plain numbers and arrays."""
         return {
             "settings": asdict(self.settings),
             "num_updates": self.num_updates,
-            "q_network": self.q_network.state_dict(),
-            "target_network": self.target_network.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
+            "q_network": _arrays(self.q_network.state_dict()),
+            "target_network": _arrays(self.target_network.state_dict()),
+            "optimizer": _arrays(
+                {
+                    f"{name}.{kind}": value
+                    for name, parameter in self.q_network.named_parameters()
+                    for kind, value in self.optimizer.state[parameter].items()
+                }
+            ),
         }
 
-    def load_state_dict(self, state: dict[str, Any]) -> None:
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Goes on where `state_dict` was taken, to the bit.
 
         Raises:
-            InputError: it was taken with other settings.
+            InputError: it was taken with other settings, or of another network.
         """
         if state["settings"] != asdict(self.settings):
             changed = [
@@ -153,9 +166,15 @@ class Learner:
             ]
             raise InputError(f"The settings differ: {'; '.join(changed)}.", "Use the same ones.")
         self.num_updates = state["num_updates"]
-        self.q_network.load_state_dict(state["q_network"])
-        self.target_network.load_state_dict(state["target_network"])
-        self.optimizer.load_state_dict(state["optimizer"])
+        load_weights(self.q_network, state["q_network"])
+        load_weights(self.target_network, state["target_network"])
+        self.optimizer.state.clear()
+        parameters = dict(self.q_network.named_parameters())
+        for key, array in state["optimizer"].items():
+            name, _, kind = key.rpartition(".")
+            like = parameters[name] if np.ndim(array) else torch.zeros((), device=self.device)
+            moment = torch.empty_like(like, requires_grad=False)  # laid out as Adam lays it out
+            self.optimizer.state[parameters[name]][kind] = moment.copy_(torch.as_tensor(array))
 
     def _components(self, network: DecompositionNetwork, observations: Tensor) -> Tensor:
         """Returns `[B, A, N+1]`, float32.
@@ -171,3 +190,28 @@ class Learner:
         if isinstance(array, np.ndarray) and not array.flags.writeable:
             array = array.copy()  # PyTorch warns of memory it could write to
         return torch.as_tensor(array, device=self.device)
+
+
+def load_weights(network: DecompositionNetwork, weights: Mapping[str, Any]) -> None:
+    """Gives a network its weights, arrays by name.
+
+    Raises:
+        InputError: they are those of another network.
+    """
+    own = {name: tuple(value.shape) for name, value in network.state_dict().items()}
+    given = {name: tuple(value.shape) for name, value in weights.items()}
+    if own != given:
+        unlike = sorted(name for name in own | given if own.get(name) != given.get(name))
+        raise InputError(
+            f"The weights are of another network: '{unlike[0]}' has shape {given.get(unlike[0])}, "
+            f"not {own.get(unlike[0])}.",
+            "Build the network for the same observations, actions and N.",
+        )
+    network.load_state_dict({name: torch.as_tensor(value) for name, value in weights.items()})
+
+
+def _arrays(tensors: Mapping[str, Tensor]) -> dict[str, npt.NDArray[Any]]:
+    """Returns copies, each with its numbers in the usual order."""
+    return {
+        name: np.array(value.detach().cpu().numpy(), order="C") for name, value in tensors.items()
+    }

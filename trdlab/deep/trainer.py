@@ -1,0 +1,223 @@
+"""Deep Q-learning with components, top to bottom: act, remember, learn; and pick up again.
+
+It is DQN (Mnih et al., 2015) with a head of A × (N+1) and the law as its target; with N = 0 it is
+plain DQN. What differs from the paper, and why, stands in the docs under "Errata and deviations".
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+
+from trdlab.arrays import BoolArray, IntArray
+from trdlab.deep.acting import FrameStack, Scores, observation_space
+from trdlab.deep.loss import greedy_actions
+from trdlab.deep.memory import memory_needed
+from trdlab.deep.networks import build_network
+from trdlab.deep.replay import ReplayBuffer
+from trdlab.deep.settings import TrainSettings
+from trdlab.deep.update import Learner
+from trdlab.environments import Environments, NotReproducible, Step
+
+
+@dataclass(frozen=True)
+class TrainMetrics:
+    """What a run tells of itself every now and then.
+
+    Args:
+        agent_steps: taken so far, of all environments together.
+        updates: made so far.
+        episodes: ended so far.
+        score: the mean return of the last hundred, as the environment pays it; None before one.
+        length: their mean length, in agent steps.
+        loss: the mean loss of the updates since the line before; None if there was none.
+        mean_value: the mean Q-value of the actions taken, likewise.
+        epsilon: the chance of a random action.
+        learning_rate: Adam's.
+    """
+
+    agent_steps: int
+    updates: int
+    episodes: int
+    score: float | None
+    length: float | None
+    loss: float | None
+    mean_value: float | None
+    epsilon: float
+    learning_rate: float
+
+
+class Trainer:
+    """An agent that learns to decompose while it acts.
+
+    Args:
+        settings: what to do.
+        environments: where; made with `settings.seed`. They are reset at once.
+
+    Raises:
+        InputError: there is no network for what the environments show.
+    """
+
+    def __init__(self, settings: TrainSettings, environments: Environments) -> None:
+        self.settings, self.environments = settings, environments
+        self.rng = np.random.default_rng(settings.seed)
+        network = build_network(
+            observation_space(environments),
+            environments.num_actions,
+            settings.time_axis,
+            seed=settings.seed,
+            hidden=settings.hidden,
+        )
+        self.learner = Learner(network, settings.update_settings, settings.device)
+        self.memory = ReplayBuffer(
+            settings.capacity,
+            **frames_of(environments),
+            width=settings.width,
+            gamma=settings.gamma,
+            num_envs=environments.num_envs,
+            stack=environments.stack,
+            padding=environments.padding,
+            time_limit=environments.time_limit,
+        )
+        self.stack = FrameStack(environments.reset(), environments.stack, environments.padding)
+        self.scores = Scores(environments.num_envs)
+        self.agent_steps = 0
+        self._losses, self._values, self._updates_told = 0.0, 0.0, 0
+
+    @property
+    def done(self) -> bool:
+        """Whether all steps have been taken."""
+        return self.agent_steps >= self.settings.agent_steps
+
+    def step(self) -> None:
+        """Acts once in every environment, remembers it, and makes the updates that are due."""
+        frames, actions = self.stack.newest.copy(), self._choose()
+        step = self.environments.step(actions)
+        self._remember(frames, actions, step)
+        self.scores.add(step)
+        self.stack.push(step.following, step.ended)
+        self.agent_steps += len(actions)
+        self._learn()
+
+    def metrics(self) -> TrainMetrics:
+        """Returns what has happened, the losses since the last call."""
+        updates = self.learner.num_updates - self._updates_told
+        told = TrainMetrics(
+            agent_steps=self.agent_steps,
+            updates=self.learner.num_updates,
+            episodes=self.scores.num_episodes,
+            score=self.scores.mean_return,
+            length=self.scores.mean_length,
+            loss=self._losses / updates if updates else None,
+            mean_value=self._values / updates if updates else None,
+            epsilon=self.settings.epsilon(self.agent_steps),
+            learning_rate=self.settings.learning_rate_at(self.agent_steps),
+        )
+        self._losses, self._values, self._updates_told = 0.0, 0.0, told.updates
+        return told
+
+    def _choose(self) -> IntArray:
+        """Returns the actions `[B]`: at random with probability ε, else the greedy ones."""
+        num_envs, num_actions = self.environments.num_envs, self.environments.num_actions
+        explore = self.rng.random(num_envs) < self.settings.epsilon(self.agent_steps)  # [B]
+        actions = self.rng.integers(num_actions, size=num_envs)  # [B]
+        if not explore.all():
+            actions = np.where(explore, actions, self._greedy())
+        return actions
+
+    @torch.inference_mode()
+    def _greedy(self) -> IntArray:
+        observations = torch.from_numpy(self.stack.observations).to(self.learner.device)
+        components = self.learner.q_network(observations)  # [B, A, N+1]
+        return np.asarray(greedy_actions(components).cpu().numpy())  # [B]
+
+    def _remember(self, frames: Any, actions: IntArray, step: Step) -> None:
+        """Stores what happened, as it is learned from: clipped, and perhaps life by life."""
+        clipped = np.sign(step.rewards) if self.settings.clip_rewards else step.rewards
+        goes_on = step.life_lost & self.settings.life_loss_ends  # [B], an end for learning only
+        self.memory.add(
+            frames,
+            actions,
+            clipped,
+            step.terminated | goes_on,
+            step.truncated,
+            step.frames,
+            goes_on=goes_on,
+        )
+
+    def _learn(self) -> None:
+        due = self.settings.updates_due(self.agent_steps)
+        if self.learner.num_updates < due:
+            self.learner.set_learning_rate(self.settings.learning_rate_at(self.agent_steps))
+        while self.learner.num_updates < due:
+            batch = self.memory.sample(self.settings.batch_size, self.rng)
+            update = self.learner.update(batch)
+            self._losses += update.loss
+            self._values += update.mean_value
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns everything that the rest of the run depends on: plain numbers, arrays, bytes."""
+        return {
+            "settings": self.settings.to_config(),
+            "progress": {
+                "agent_steps": self.agent_steps,
+                "losses": self._losses,
+                "values": self._values,
+                "updates_told": self._updates_told,
+                "rng": self.rng.bit_generator.state,
+            },
+            "scores": self.scores.state_dict(),
+            "stack": self.stack.frames.copy(),
+            "learner": self.learner.state_dict(),
+            "memory": self.memory.state_dict(),
+            "environments": self.environments.state_dict(),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> NotReproducible | None:
+        """Goes on where `state_dict` was taken, to the bit.
+
+        Returns:
+            What went wrong if the environments could not be restored: they have begun new
+            episodes then, and the running ones stand in the memory as truncated.
+
+        Raises:
+            InputError: the state is of a run with other settings.
+        """
+        progress = state["progress"]
+        self.agent_steps = progress["agent_steps"]
+        self._losses, self._values = progress["losses"], progress["values"]
+        self._updates_told = progress["updates_told"]
+        self.rng.bit_generator.state = progress["rng"]
+        self.scores.load_state_dict(state["scores"])
+        self.learner.load_state_dict(state["learner"])
+        self.memory.load_state_dict(state["memory"])
+        try:
+            self.environments.load_state_dict(state["environments"])
+        except NotReproducible as problem:
+            self.memory.interrupt()
+            self.scores.drop()
+            self.stack.begin(self.environments.reset(), _all(self.environments.num_envs))
+            return problem
+        self.stack.frames[...] = state["stack"]
+        return None
+
+    def memory_needed(self) -> int:
+        """Returns the bytes that the replay memory will take when it is full."""
+        held = self.memory.bytes_per_frame if len(self.memory) else None
+        return memory_needed(
+            self.settings.capacity,
+            **frames_of(self.environments),
+            num_envs=self.environments.num_envs,
+            frame_nbytes=held,
+        )
+
+
+def frames_of(environments: Environments) -> dict[str, Any]:
+    """Returns shape and type of a frame, as the replay memory takes them."""
+    space = environments.observation_space
+    return {"shape": space.shape or (), "dtype": space.dtype}
+
+
+def _all(num_envs: int) -> BoolArray:
+    return np.ones(num_envs, dtype=np.bool_)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
@@ -57,7 +56,7 @@ def interquartile_mean(samples: FloatArray) -> FloatArray:
 
 
 def bootstrap(
-    samples: Sequence[float] | npt.NDArray[np.float64],
+    samples: Sequence[float] | FloatArray,
     statistic: Callable[[FloatArray], FloatArray] = mean,
     *,
     rng: np.random.Generator,

@@ -11,14 +11,15 @@ import numpy as np
 import torch
 
 from trdlab.arrays import BoolArray, IntArray
-from trdlab.deep.acting import FrameStack, Scores, observation_space
 from trdlab.deep.loss import greedy_actions
 from trdlab.deep.memory import memory_needed
 from trdlab.deep.networks import build_network
 from trdlab.deep.replay import ReplayBuffer
+from trdlab.deep.scores import Scores
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.update import Learner
 from trdlab.environments import Environments, NotReproducible, Step
+from trdlab.environments.stack import FrameStack, observation_space
 
 
 @dataclass(frozen=True)

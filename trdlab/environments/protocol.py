@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-import gymnasium as gym
 import numpy.typing as npt
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.errors import TrdlabError
+
+if TYPE_CHECKING:
+    import gymnasium as gym
 
 Frames = npt.NDArray[Any]
 Padding = Literal["reset", "zero"]
@@ -64,7 +66,7 @@ class Environments(Protocol):
     """
 
     num_envs: int
-    observation_space: gym.Space[Any]
+    observation_space: "gym.Space[Any]"
     num_actions: int
     first_action: int
     action_names: tuple[str, ...]

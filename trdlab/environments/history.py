@@ -1,0 +1,147 @@
+"""What environments have done since they were last seeded: enough to do it again."""
+
+from array import array
+from collections.abc import Mapping
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+
+from trdlab.arrays import FloatArray, IntArray
+from trdlab.environments.protocol import Frames, NotReproducible
+from trdlab.errors import InputError, TrdlabError
+
+
+class Histories:
+    """The seeds and actions of B environments, from which they can be restored to the bit.
+
+    What an environment does is a function of the seed of its last seeded reset and of the actions
+    since. Its seeds are drawn from `SeedSequence([seed, i, k])`, with k = 0, 1, … counting the
+    seeded resets of environment i. At the end of an episode the next reset is a seeded one if
+    `reseed_after` actions or more were taken since the last: the fewer, the shorter the histories,
+    and the more often the price of a seeded reset is paid.
+
+    Args:
+        settings: what must be the same where a saved history is to be replayed, as plain values.
+        num_envs: B.
+        seed: what the seeds are drawn from.
+        reseed_after: see above.
+
+    Raises:
+        InputError: there are no environments, or the seed is negative.
+    """
+
+    def __init__(
+        self,
+        settings: Mapping[str, Any],
+        *,
+        num_envs: int,
+        seed: int,
+        reseed_after: int = 0,
+    ) -> None:
+        if num_envs < 1:
+            raise InputError(f"There are {num_envs} environments.", "Make at least 1.")
+        if seed < 0:
+            raise InputError(f"The seed is {seed}.", "It must be a whole number from 0 on.")
+        self._seed, self._reseed_after = seed, reseed_after
+        self._settings = {**settings, "num_envs": num_envs, "seed": seed}
+        self._settings["reseed_after"] = reseed_after
+        self._seedings = np.full(num_envs, -1, dtype=np.int64)  # k
+        self._actions = [array("i") for _ in range(num_envs)]
+        self._checksums = [0] * num_envs
+
+    def begin(self, env: int) -> int:
+        """Forgets the past of an environment, and returns the seed to reset it with."""
+        self._seedings[env] += 1
+        self._actions[env] = array("i")
+        self._checksums[env] = 0
+        words = np.random.SeedSequence([self._seed, env, int(self._seedings[env])])
+        return int(words.generate_state(1)[0] >> 1)  # 31 bits: ALE's seeds are signed
+
+    def is_due(self, env: int) -> bool:
+        """Whether the next reset of an environment should be a seeded one."""
+        return len(self._actions[env]) >= self._reseed_after
+
+    def record_reset(self, env: int, frames: Frames) -> None:
+        """Notes the first frame of an episode, that of `env` in `frames [B, ...]`."""
+        self._checksums[env] = crc32(frames[env : env + 1].data, self._checksums[env])
+
+    def record_step(self, env: int, action: int, frames: Frames, rewards: FloatArray) -> None:
+        """Notes an action and what it led to, that of `env` in `frames` and `rewards [B]`."""
+        self._actions[env].append(action)
+        seen = crc32(frames[env : env + 1].data, self._checksums[env])
+        self._checksums[env] = crc32(rewards[env : env + 1].data, seen)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns the histories as plain settings and small arrays.
+
+        Raises:
+            TrdlabError: no episode has begun.
+        """
+        if self._seedings.min() < 0:
+            raise TrdlabError("The environments have not begun.", "Call reset() first.")
+        actions = np.concatenate(self._actions)  # [Σ lengths]
+        return {
+            "settings": dict(self._settings),
+            "seedings": self._seedings.copy(),  # [B]
+            "lengths": np.array([len(actions) for actions in self._actions]),  # [B]
+            "actions": actions.astype(np.min_scalar_type(actions.max(initial=0))),
+            "checksums": np.array(self._checksums, dtype=np.int64),  # [B]
+        }
+
+    def rewind(self, state: Mapping[str, Any]) -> list[IntArray]:
+        """Goes back to the seeded resets of a saved state; returns the actions since, B arrays.
+
+        Raises:
+            InputError: it was saved with other settings, or is torn.
+        """
+        for name, value in self._settings.items():
+            saved = state["settings"].get(name)
+            if saved != value:
+                raise InputError(
+                    f"The saved environments have {name} = {saved}, these have {value}.",
+                    "Resume with the options that the run began with.",
+                )
+        lengths, actions = np.asarray(state["lengths"]), np.asarray(state["actions"])
+        if len(lengths) != len(self._actions) or lengths.sum() != len(actions):
+            raise InputError(
+                f"The saved environments have {len(actions)} actions in place of {lengths.sum()}.",
+                "The file is torn: resume from an earlier one.",
+            )
+        self._seedings[:] = np.asarray(state["seedings"]) - 1
+        return np.split(actions.astype(np.int64), np.cumsum(lengths)[:-1])
+
+    def verify(self, state: Mapping[str, Any], name: str) -> None:
+        """Compares what a replay has led to with what was saved.
+
+        Raises:
+            NotReproducible: something else was seen on the way.
+        """
+        different = np.flatnonzero(np.asarray(state["checksums"]) != self._checksums)
+        self._seedings = np.maximum(self._seedings, state["seedings"])  # no seed comes twice
+        if len(different):
+            env = int(different[0])
+            raise NotReproducible(
+                f"{name} did something else when {int(state['lengths'][env])} actions were taken "
+                f"again from the same seed (environment {env}).",
+                "Begin new episodes with reset().",
+            )
+
+
+def checked_actions(actions: Any, num_envs: int, num_actions: int) -> IntArray:
+    """Returns actions `[B]`.
+
+    Raises:
+        InputError: there are not B of them, or one does not exist.
+    """
+    given = np.asarray(actions)
+    if given.shape != (num_envs,) or given.dtype.kind not in "iu":
+        raise InputError(
+            f"The actions have shape {given.shape} and type {given.dtype}.",
+            f"Give {num_envs} whole numbers.",
+        )
+    if given.min() < 0 or given.max() >= num_actions:
+        raise InputError(
+            f"The actions are {given.tolist()}.", f"They run from 0 to {num_actions - 1}."
+        )
+    return given.astype(np.int64, copy=False)

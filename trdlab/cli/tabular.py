@@ -60,12 +60,13 @@ def tabular(
     Component 0 is the reward of the action taken now; the last component,
     the residual, holds all that comes after N*w steps.
     """
+    from trdlab.environments.arguments import parse_arguments
     from trdlab.show import tabular as show
 
     common.publish(
         lambda: show.report(
             env_id,
-            show.parse_arguments(env_arguments or []),
+            parse_arguments(env_arguments or []),
             gamma=gamma,
             horizon=horizon,
             width=width,

@@ -2,11 +2,11 @@
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from trdlab.decomposition import TimeAxis
-from trdlab.errors import InputError
+from trdlab.environments.arguments import say_arguments
 from trdlab.explain.contrast import difference
 from trdlab.explain.explanation import explain
 from trdlab.explain.moment import Moment, WhatIf
@@ -16,7 +16,7 @@ from trdlab.show.report import Report, Scene
 from trdlab.tabular import ExactTable, Ties, exact
 from trdlab.tabular.models import part_after
 from trdlab.tabular.named import TabularWorld
-from trdlab.tabular.toytext import make_world, say_arguments
+from trdlab.tabular.toytext import make_world
 
 SCHEMA = "trdlab.tabular/1"
 _VARIANTS = ("is_slippery", "is_rainy")
@@ -61,39 +61,6 @@ def report(
     if foil is None:
         foil = _other(moment, action)
     return Report(scene, table, index, explain(moment, action, foil))
-
-
-def parse_arguments(words: Sequence[str]) -> dict[str, bool | int | float | str]:
-    """Returns the arguments that are written as `KEY=VALUE`, each value as what it looks like.
-
-    Raises:
-        InputError: one is not written like that, or stands there twice.
-
-    >>> parse_arguments(["is_slippery=false", "map_name=8x8", "success_rate=0.8"])
-    {'is_slippery': False, 'map_name': '8x8', 'success_rate': 0.8}
-    """
-    arguments: dict[str, bool | int | float | str] = {}
-    for word in words:
-        name, separator, text = word.partition("=")
-        if not separator or not name.isidentifier():
-            raise InputError(
-                f"The argument '{word}' is not KEY=VALUE.", "For example: is_slippery=false."
-            )
-        if name in arguments:
-            raise InputError(f"The argument '{name}' is given twice.", "Give it once.")
-        arguments[name] = _parsed(text)
-    return arguments
-
-
-def _parsed(text: str) -> bool | int | float | str:
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
 
 
 def _other(moment: Moment, action: str | None) -> str | None:

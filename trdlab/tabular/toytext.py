@@ -1,14 +1,11 @@
 """Gymnasium's environments with a transition table, made by id and put into words."""
 
 import inspect
-import warnings
 from collections.abc import Callable, Mapping
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from trdlab.errors import InputError, TrdlabError, closest
 from trdlab.formatting import amount
 from trdlab.tabular.environments import environment_name, from_environment, start_distribution
 from trdlab.tabular.mdp import MDP
@@ -69,35 +66,9 @@ def make_world(env_id: str, arguments: Mapping[str, Any] | None = None) -> Tabul
         InputError: there is no such environment, it does not take the arguments, or it has no
             transition table.
     """
-    import gymnasium
+    from trdlab.environments.making import make_environment
 
-    given = dict(arguments or {})
-    known = toy_text_ids()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an id without a version, or an old one
-            module, _, name = env_id.rpartition(":")
-            if module:
-                import_module(module)
-            _check_arguments(name, gymnasium.spec(name).entry_point, given)
-            env = gymnasium.make(name, disable_env_checker=True, **given)
-    except TrdlabError:
-        raise
-    except gymnasium.error.DependencyNotInstalled as error:
-        raise InputError(f"{env_id} cannot be made: {error}.", "Install what it needs.") from error
-    except gymnasium.error.Error as error:
-        raise InputError(f"There is no environment '{env_id}'.", closest(env_id, known)) from error
-    except ImportError as error:
-        raise InputError(
-            f"{env_id} cannot be imported: {error}.", "Install what it needs, or check the id."
-        ) from error
-    except (TypeError, ValueError, LookupError, AssertionError, AttributeError) as error:
-        made = f" with {say_arguments(given)}" if given else ""
-        reason = str(error).partition(" was raised from the environment creator")[0]
-        raise InputError(
-            f"{env_id} cannot be made{made} ({type(error).__name__}: {reason}).",
-            "Its documentation says what each argument takes.",
-        ) from error
+    env = make_environment(env_id, arguments, known=toy_text_ids())
     world = tabular_world(env)
     env.close()
     return world
@@ -109,33 +80,6 @@ def toy_text_ids() -> list[str]:
 
     specs = [spec for spec in gymnasium.registry.values() if ".toy_text." in str(spec.entry_point)]
     return [spec.id for spec in specs if not spec.name.startswith("Blackjack")]
-
-
-def say_arguments(arguments: Mapping[str, Any]) -> str:
-    """Returns arguments as they are written on the command line.
-
-    >>> say_arguments({"map_name": "8x8", "is_slippery": False})
-    'map_name=8x8, is_slippery=false'
-    """
-    return ", ".join(
-        f"{name}={str(value).lower() if isinstance(value, bool) else value}"
-        for name, value in arguments.items()
-    )
-
-
-def _check_arguments(env_id: str, creator: Any, given: Mapping[str, Any]) -> None:
-    from gymnasium.envs.registration import load_env_creator
-
-    function = load_env_creator(creator) if isinstance(creator, str) else creator
-    parameters = inspect.signature(function).parameters
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
-        return
-    for name, value in given.items():
-        if name not in parameters:
-            names = [known for known in parameters if known != "render_mode"]
-            raise InputError(f"{env_id} takes no argument '{name}'.", closest(name, names))
-        if isinstance(parameters[name].default, bool) and not isinstance(value, bool):
-            raise InputError(f"The argument {name} is '{value}'.", "It must be true or false.")
 
 
 def _defaults(kind: type) -> dict[str, Any]:

@@ -127,7 +127,7 @@ def finite_loss(loss: Tensor, update: int) -> float:
     if not math.isfinite(number):
         raise TrdlabError(
             f"The loss is {number} at update {update}.",
-            "Nothing was learned from it: go on from the last checkpoint with a lower learning "
-            "rate, and see that rewards and observations are finite.",
+            "Nothing was learned from it. See that rewards and observations are finite, or begin "
+            "again with a lower learning rate.",
         )
     return number

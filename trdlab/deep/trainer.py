@@ -73,7 +73,7 @@ class Trainer:
         self.learner = Learner(network, settings.update_settings, settings.device)
         self.memory = ReplayBuffer(
             settings.capacity,
-            **frames_of(environments),
+            **_frames_of(environments),
             width=settings.width,
             gamma=settings.gamma,
             num_envs=environments.num_envs,
@@ -203,18 +203,17 @@ class Trainer:
         self.stack.frames[...] = state["stack"]
         return None
 
-    def memory_needed(self) -> int:
-        """Returns the bytes that the replay memory will take when it is full."""
-        held = self.memory.bytes_per_frame if len(self.memory) else None
+    def memory_needed(self, capacity: int) -> int:
+        """Returns the bytes that a full replay memory of this capacity would take here."""
         return memory_needed(
-            self.settings.capacity,
-            **frames_of(self.environments),
+            capacity,
+            **_frames_of(self.environments),
             num_envs=self.environments.num_envs,
-            frame_nbytes=held,
+            frame_nbytes=self.memory.bytes_per_frame if len(self.memory) else None,
         )
 
 
-def frames_of(environments: Environments) -> dict[str, Any]:
+def _frames_of(environments: Environments) -> dict[str, Any]:
     """Returns shape and type of a frame, as the replay memory takes them."""
     space = environments.observation_space
     return {"shape": space.shape or (), "dtype": space.dtype}

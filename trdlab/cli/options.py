@@ -1,0 +1,93 @@
+"""The options of a training run, made from the fields of its settings: said once, there."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Annotated, Any
+
+import typer
+
+from trdlab.deep.presets import preset
+from trdlab.deep.settings import Kind, TrainSettings
+
+_POSITIONAL = ("kind", "env")
+
+
+def with_settings(kind: Kind) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Gives a command an option for each setting; those that are used arrive in `given`, by key.
+
+    Args:
+        kind: whose default preset the help shows.
+    """
+    shown = preset(kind, "").to_config()
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        own = [
+            parameter
+            for parameter in inspect.signature(command, eval_str=True).parameters.values()
+            if parameter.name != "given"
+        ]
+        options = {key: _option(key, shown.get(key)) for key in _keys()}
+        signature = inspect.Signature([*own, *options.values()])
+
+        def run(**values: Any) -> Any:
+            given = {
+                key: value for key in options if (value := _given(key, values.pop(key))) is not None
+            }
+            return command(**values, given=given)
+
+        run.__name__, run.__doc__ = command.__name__, command.__doc__
+        run.__signature__ = signature  # type: ignore[attr-defined]
+        run.__annotations__ = {name: p.annotation for name, p in signature.parameters.items()}
+        return run
+
+    return decorate
+
+
+def flag(key: str) -> str:
+    """Returns how a key of the configuration is written on the command line.
+
+    >>> flag("agent_steps"), flag("N")
+    ('--agent-steps', '--N')
+    """
+    return "--" + key.replace("_", "-")
+
+
+def _keys() -> dict[str, Any]:
+    return {
+        of.metadata.get("key") or of.name: of
+        for of in fields(TrainSettings)
+        if of.name not in _POSITIONAL
+    }
+
+
+def _option(key: str, default: Any) -> inspect.Parameter:
+    of = _keys()[key]
+    kind: Any = type(of.default) if of.default is not None else float
+    names = flag(key)
+    if kind is bool:
+        names = f"{names}/--no-{names.removeprefix('--')}"
+    elif kind is tuple:
+        kind = list[str] if key == "env_arg" else str
+        default = None if key == "env_arg" else ",".join(map(str, default))
+    about = typer.Option(
+        names,
+        help=of.metadata["help"],
+        rich_help_panel=of.metadata["panel"],
+        show_default=str(default) if default is not None else False,
+    )
+    return inspect.Parameter(
+        key, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, about]
+    )
+
+
+def _given(key: str, value: Any) -> Any:
+    """Returns an option's value as the configuration writes it; None where it was not used."""
+    if key != "hidden" or value is None:
+        return value
+    try:
+        return [int(size) for size in value.split(",") if size.strip()]
+    except ValueError as error:
+        raise typer.BadParameter(
+            f"{flag(key)} is '{value}': give sizes, such as 128,128"
+        ) from error

@@ -1,0 +1,176 @@
+"""A run in its folder: begun, carried on, stopped, picked up again."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from trdlab.deep.memory import check_memory
+from trdlab.deep.settings import TrainSettings
+from trdlab.deep.trainer import Trainer, TrainMetrics
+from trdlab.errors import InputError, TrdlabError
+from trdlab.runs import (
+    MetricsFile,
+    RunFolder,
+    checkpoint_steps,
+    load_checkpoint,
+    save_checkpoint,
+)
+from trdlab.training.setup import describe, make_environments, new_trainer, resolved
+
+
+@dataclass(eq=False)
+class Run:
+    """A run that this process holds.
+
+    Args:
+        folder: where it is kept.
+        trainer: what learns.
+        metrics: where its numbers go.
+        seconds: how long it has been trained, this process and those before.
+        problem: what could not be restored when it was picked up, or None.
+    """
+
+    folder: RunFolder
+    trainer: Trainer
+    metrics: MetricsFile
+    seconds: float = 0.0
+    problem: TrdlabError | None = None
+
+    def save(self) -> None:
+        """Saves a checkpoint.
+
+        Raises:
+            OutputError: the disk is full; earlier checkpoints stay.
+        """
+        state = self.trainer.state_dict()
+        state["q_network"] = state["learner"].pop("q_network")  # so that it can be read alone
+        blocks = state["memory"]["frames"].pop("sealed")
+        state["run"] = {"metrics_length": self.metrics.sync(), "seconds": self.seconds}
+        save_checkpoint(self.folder, self.trainer.agent_steps, state, blocks)
+
+    def restore(self, step: int | None = None) -> None:
+        """Goes back to a checkpoint, by default the newest.
+
+        Raises:
+            InputError: there is none, or the configuration has been changed since.
+            TrdlabError: it is torn.
+        """
+        checkpoint = load_checkpoint(self.folder, step)
+        state: dict[str, Any] = checkpoint.state
+        _check_unchanged(state["settings"], self.trainer.settings.to_config(), checkpoint.step)
+        state["learner"]["q_network"] = state.pop("q_network")
+        state["memory"]["frames"]["sealed"] = checkpoint.blocks
+        self.problem = self.trainer.load_state_dict(state)
+        self.seconds = state["run"]["seconds"]
+        self.metrics = MetricsFile(self.folder.metrics, state["run"]["metrics_length"])
+
+
+@contextmanager
+def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
+    """Begins a run in a new folder.
+
+    Raises:
+        InputError: the environments cannot be made, or have no network.
+        OutputError: the folder exists, or cannot be written.
+        TrdlabError: the replay memory does not fit into what is free.
+    """
+    with ExitStack() as stack:
+        trainer = _trainer(settings, stack)
+        check_memory(trainer.memory_needed(settings.capacity), settings.capacity)
+        extra = {"environment": describe(trainer.environments)}
+        folder = RunFolder.create(path, trainer.settings.to_config(), extra)
+        stack.enter_context(folder.held())
+        yield Run(folder, trainer, stack.enter_context(MetricsFile(folder.metrics, 0)))
+
+
+@contextmanager
+def resume(path: Path, step: int | None = None) -> Iterator[Run]:
+    """Picks up a run where its newest checkpoint stands, or at its beginning if there is none.
+
+    Args:
+        path: its folder.
+        step: of an older checkpoint, in agent steps.
+
+    Raises:
+        InputError: there is no run, no such checkpoint, or its configuration has been changed.
+        TrdlabError: another process holds it, or something is torn.
+    """
+    folder = RunFolder.open(path)
+    settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
+    with ExitStack() as stack:
+        stack.enter_context(folder.held())
+        trainer = _trainer(settings, stack)
+        check_memory(trainer.memory_needed(settings.capacity), settings.capacity)
+        begun = bool(checkpoint_steps(folder)) or step is not None
+        run = Run(folder, trainer, MetricsFile(folder.metrics, None if begun else 0))
+        stack.callback(lambda: run.metrics.close())
+        if begun:
+            run.metrics.close()
+            run.restore(step)
+        yield run
+
+
+def carry_on(
+    run: Run,
+    *,
+    on_metrics: Callable[[TrainMetrics], None] = lambda metrics: None,
+    on_step: Callable[[Trainer], None] = lambda trainer: None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> bool:
+    """Trains to the end, or until it should stop; saves in either case.
+
+    Args:
+        run: what to carry on.
+        on_metrics: told every `log_every` agent steps, after the line was written.
+        on_step: told after each step of the environments.
+        should_stop: asked before each step.
+
+    Returns:
+        Whether the run has come to its end.
+
+    Raises:
+        TrdlabError: the loss is not finite. The last checkpoint stays the one before.
+        OutputError: the disk is full; likewise.
+    """
+    trainer, settings = run.trainer, run.trainer.settings
+    saved, since = -1, time.perf_counter()
+    while not trainer.done and not should_stop():
+        before = trainer.agent_steps
+        trainer.step()
+        now = time.perf_counter()
+        run.seconds, since = run.seconds + now - since, now
+        if _passes(before, trainer.agent_steps, settings.log_every):
+            metrics = trainer.metrics()
+            run.metrics.append({**asdict(metrics), "seconds": round(run.seconds, 3)})
+            on_metrics(metrics)
+        if _passes(before, trainer.agent_steps, settings.checkpoint_every):
+            run.save()
+            saved, since = trainer.agent_steps, time.perf_counter()
+        on_step(trainer)
+    if saved != trainer.agent_steps:
+        run.save()
+    return trainer.done
+
+
+def _trainer(settings: TrainSettings, stack: ExitStack) -> Trainer:
+    environments = make_environments(settings)
+    stack.callback(environments.close)
+    return new_trainer(resolved(settings, environments), environments)
+
+
+def _passes(before: int, after: int, every: int) -> bool:
+    return after // every > before // every
+
+
+def _check_unchanged(then: dict[str, Any], now: dict[str, Any], step: int) -> None:
+    changed = [key for key in then | now if then.get(key) != now.get(key)]
+    if changed:
+        key = changed[0]
+        raise InputError(
+            f"The configuration says {key} = {now.get(key)!r}, and the checkpoint at {step} agent "
+            f"steps was made with {then.get(key)!r}.",
+            "Put it back, or begin another run with it: trdlab train --config.",
+        )

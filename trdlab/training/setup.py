@@ -1,0 +1,188 @@
+"""What a run is made of, from its settings: the environments, the device, the plan."""
+
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import gymnasium as gym
+import numpy as np
+
+from trdlab.deep.settings import TrainSettings
+from trdlab.environments import Environments
+from trdlab.environments.arguments import parse_arguments
+from trdlab.environments.stack import observation_space
+from trdlab.errors import InputError
+from trdlab.estimator import Future
+
+if TYPE_CHECKING:
+    from trdlab.deep.trainer import Trainer
+
+_MEASURED_SECONDS = 3.0
+
+
+def make_environments(
+    settings: TrainSettings, *, num_envs: int | None = None, seed: int | None = None
+) -> Environments:
+    """Makes the environments of a run, or of its evaluation.
+
+    Args:
+        settings: which ones.
+        num_envs: how many; by default as many as the run has.
+        seed: what their seeds are drawn from; by default that of the run.
+
+    Raises:
+        InputError: they cannot be made.
+    """
+    arguments = parse_arguments(settings.env_arg)
+    count = settings.num_envs if num_envs is None else num_envs
+    seed = settings.seed if seed is None else seed
+    if settings.kind == "atari":
+        from trdlab.atari import AtariEnvironments
+
+        return AtariEnvironments(settings.env, count, seed=seed, **_for_atari(arguments))
+    from trdlab.environments import GymEnvironments
+
+    return GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments)
+
+
+def resolved(settings: TrainSettings, environments: Environments) -> TrainSettings:
+    """Returns the settings with what `auto` and 0 stand for on this machine.
+
+    Raises:
+        InputError: PyTorch does not find the device.
+    """
+    images = environments.stack is not None
+    threads = settings.threads or (os.cpu_count() or 1 if images else 1)
+    return replace(settings, device=_device(settings.device), threads=threads)
+
+
+def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer":
+    """Returns the trainer of a run, and lets PyTorch use as many threads as it should."""
+    import torch
+
+    from trdlab.deep.trainer import Trainer
+
+    torch.set_num_threads(settings.threads)
+    return Trainer(settings, environments)
+
+
+def describe(environments: Environments) -> dict[str, Any]:
+    """Returns what must be known of environments to use their agent without them; plain data."""
+    space = observation_space(environments)
+    if isinstance(space, gym.spaces.Discrete):
+        seen: dict[str, Any] = {"states": int(space.n), "first_state": int(space.start)}
+    else:
+        seen = {"shape": list(space.shape or ()), "dtype": np.dtype(space.dtype).name}
+    return {
+        "observation": seen,
+        "num_actions": environments.num_actions,
+        "first_action": environments.first_action,
+        "action_names": list(environments.action_names),
+        "time_limit": environments.time_limit,
+        "frame_skip": environments.frame_skip,
+        "frames_per_second": environments.frames_per_second,
+    }
+
+
+def described_space(observation: Mapping[str, Any]) -> gym.spaces.Space[Any]:
+    """Returns the observation space that `describe` wrote down (bounds are not kept)."""
+    if "states" in observation:
+        return gym.spaces.Discrete(observation["states"], start=observation["first_state"])
+    dtype = np.dtype(observation["dtype"])
+    low, high = (0, 255) if dtype == np.uint8 else (-np.inf, np.inf)
+    return gym.spaces.Box(low, high, tuple(observation["shape"]), dtype=dtype.type)
+
+
+def future(settings: TrainSettings) -> Future:
+    """Returns whose future the agent of a run tells: which policy, which reward, which ending."""
+    policy = "the greedy policy of the network"
+    if settings.width > 1:
+        policy += f" (for the first {settings.width} steps, the ε-greedy one it learned from)"
+    reward = "the sign of each reward" if settings.clip_rewards else Future(policy).reward
+    ending = "a lost life, or the end of the game" if settings.life_loss_ends else "terminal states"
+    return Future(policy, reward, ending)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run will take on this machine.
+
+    Args:
+        settings: as resolved.
+        memory: the bytes of the full replay memory.
+        available: the bytes that are free; None if unknown.
+        seconds: of training, as measured in a few seconds of it.
+        steps_per_second: agent steps of all environments together, while learning.
+    """
+
+    settings: TrainSettings
+    memory: int
+    available: int | None
+    seconds: float
+    steps_per_second: float
+
+
+def plan(settings: TrainSettings) -> Plan:
+    """Makes a run in miniature, learns for a few seconds, and says what the whole one will take."""
+    from trdlab.deep.memory import available_memory
+
+    environments = make_environments(settings)
+    try:
+        settings = resolved(settings, environments)
+        warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
+        begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)
+        trainer = new_trainer(begun, environments)
+        acting = _steps_per_second(trainer, until=warm_up, at_most=_MEASURED_SECONDS)
+        while trainer.learner.num_updates < 2:  # what PyTorch does once
+            trainer.step()
+        # ε is 1 in the beginning; what acts greedily must look at the network
+        trainer.settings = replace(begun, epsilon_start=settings.epsilon_end)
+        learning = _steps_per_second(trainer, until=None, at_most=_MEASURED_SECONDS)
+        first = min(settings.learning_starts, settings.agent_steps)
+        seconds = first / acting + (settings.agent_steps - first) / learning
+        memory = trainer.memory_needed(settings.capacity)
+        return Plan(settings, memory, available_memory(), seconds, learning)
+    finally:
+        environments.close()
+
+
+def _steps_per_second(trainer: "Trainer", *, until: int | None, at_most: float) -> float:
+    begun, before = time.perf_counter(), trainer.agent_steps
+    while (passed := time.perf_counter() - begun) < at_most:
+        if until is not None and trainer.agent_steps >= until:
+            break
+        trainer.step()
+    return (trainer.agent_steps - before) / max(passed, 1e-9)
+
+
+def _device(wanted: str) -> str:
+    import torch
+
+    found = ["cpu"]
+    if torch.cuda.is_available():
+        found.append("cuda")
+    if torch.backends.mps.is_available():
+        found.append("mps")
+    if wanted == "auto":
+        return found[1] if len(found) > 1 else "cpu"
+    if wanted.partition(":")[0] not in found:
+        raise InputError(
+            f"PyTorch finds no device '{wanted}' here.", f"Use one of: auto, {', '.join(found)}."
+        )
+    return wanted
+
+
+def _for_atari(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Returns the arguments of `AtariEnvironments`, checked by name."""
+    from inspect import signature
+
+    from trdlab.atari import AtariEnvironments
+    from trdlab.errors import closest
+
+    known = set(signature(AtariEnvironments).parameters) - {"game", "num_envs", "seed"}
+    for name in arguments:
+        if name not in known:
+            raise InputError(f"Atari games take no argument '{name}'.", closest(name, known))
+    return arguments

@@ -1,11 +1,14 @@
 """Writing results: never over an old one by accident, never half a file."""
 
+import json
 import os
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
+from shutil import rmtree
+from typing import Any
 
-from trdlab.errors import OutputError, closest
+from trdlab.errors import OutputError, TrdlabError, closest
 
 
 def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = False) -> None:
@@ -40,23 +43,89 @@ def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = Fal
         raise OutputError(f"The folder '{folder}' is not writable.", "Choose another one.")
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    """Writes a file under a temporary name beside it, and renames it when it is complete.
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Writes a file or a folder under a temporary name beside it, and renames it when complete.
+
+    Whatever happens, a power cut included, there is what was there before or all of what is new.
 
     Args:
-        path: the file to write.
-        write: writes to the path that it is given (with the same ending).
+        path: the file to write, or the folder, which may be there only if it is empty.
+        write: writes to the path that it is given (with the same ending), or makes a folder there.
 
     Raises:
-        OutputError: the disk is full, or the file cannot be written for another reason.
+        OutputError: the disk is full, or it cannot be written for another reason.
     """
-    temporary = path.with_name(f".{path.stem[:40]}.{os.getpid()}{path.suffix}")  # names have limits
+    # Names have limits. The dot marks what a killed process may have left: see `is_leftover`.
+    temporary = path.with_name(f".{path.stem[:40]}.{os.getpid()}{path.suffix}")
     try:
+        remove(temporary)  # of a killed process that had our number
         write(temporary)
+        _sync(temporary)
         temporary.replace(path)
+        _sync_entry(path.parent)
     except OSError as error:
         reason = error.strerror or error
         raise OutputError(f"Cannot write '{path}': {reason}.", "Choose another place.") from error
     finally:
-        with suppress(OSError):  # gone already, or never there
-            temporary.unlink()
+        with suppress(OSError):  # the failure, if there is one, is told already
+            remove(temporary)
+
+
+def is_leftover(path: Path) -> bool:
+    """Returns whether this is what `write_whole` leaves behind if the process is killed."""
+    return path.name.startswith(".")
+
+
+def remove(path: Path) -> None:
+    """Removes a file, or a folder with all that is in it, if it is there."""
+    if path.is_dir() and not path.is_symlink():
+        rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def write_json(path: Path, data: object) -> None:
+    """Writes plain data as a JSON file, whole or not at all.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    text = json.dumps(data, indent=1, allow_nan=False)
+    write_whole(path, lambda temporary: temporary.write_text(text + "\n", encoding="utf-8"))
+
+
+def read_json(path: Path) -> Any:
+    """Returns what a JSON file holds.
+
+    Raises:
+        TrdlabError: it cannot be read, or it is torn.
+    """
+    try:
+        return json.loads(path.read_bytes())
+    except OSError as error:
+        reason = error.strerror or error
+        raise TrdlabError(f"'{path}' cannot be read: {reason}.") from error
+    except (ValueError, RecursionError) as error:
+        raise TrdlabError(f"'{path}' is torn: {error}.") from error
+
+
+def _sync(path: Path) -> None:
+    """Waits until a file, or a folder with all that is in it, is on the disk."""
+    if path.is_dir():
+        for entry in path.iterdir():
+            _sync(entry)
+        _sync_entry(path)
+    else:
+        with path.open("rb+") as file:
+            os.fsync(file.fileno())
+
+
+def _sync_entry(folder: Path) -> None:
+    """Waits until the names in a folder are on the disk."""
+    if os.name == "nt":  # where a folder cannot be opened
+        return
+    number = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)

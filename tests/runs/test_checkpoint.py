@@ -1,0 +1,224 @@
+"""A checkpoint is whole or not there, and what comes back is what was saved."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from trdlab.errors import InputError, TrdlabError
+from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_arrays, save_checkpoint
+from trdlab.runs.state import DTYPES, pack, unpack
+
+
+@pytest.fixture
+def run(tmp_path) -> RunFolder:
+    return RunFolder.create(tmp_path / "run", {"seed": 1})
+
+
+def a_state(step: int) -> dict:
+    """Returns a state all of whose parts tell the step."""
+    return {
+        "q_network": {"head.weight": np.full((3, 2), step, np.float32), "bias": np.array(step)},
+        "memory": {"frames": {"open": {"0-000001": bytes([step % 256]) * 5}}},
+        "progress": {"agent_steps": step, "rng": {"state": 2**127 + step}, "losses": [0.5, None]},
+    }
+
+
+def some_blocks(*numbers: int) -> dict[str, bytes]:
+    return {f"0-{number:06d}": bytes([number]) * 1000 for number in numbers}
+
+
+def same(a: object, b: object) -> bool:
+    """Returns whether two states are equal to the bit, types included."""
+    if isinstance(a, np.ndarray):
+        return (
+            isinstance(b, np.ndarray)
+            and (a.dtype, a.shape) == (b.dtype, b.shape)
+            and a.tobytes() == b.tobytes()
+        )
+    if isinstance(a, dict):
+        return isinstance(b, dict) and list(a) == list(b) and all(same(a[k], b[k]) for k in a)
+    if isinstance(a, list):
+        return isinstance(b, list) and len(a) == len(b) and all(map(same, a, b))
+    return type(a) is type(b) and repr(a) == repr(b)
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+# ---- what comes back ---------------------------------------------------------------------------
+
+ARRAYS = hnp.arrays(st.sampled_from(sorted(DTYPES, key=str)), hnp.array_shapes(min_dims=0))
+PLAIN = st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.binary()
+NAMES = st.text(max_size=5).filter(lambda name: not name.startswith("$"))
+NESTED = st.recursive(
+    PLAIN | ARRAYS,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(NAMES, inner, max_size=3),
+    max_leaves=8,
+)
+STATES = st.dictionaries(st.from_regex(r"[a-z][a-z0-9_]{0,9}", fullmatch=True), NESTED, max_size=4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(STATES)
+def test_any_state_comes_back_to_the_bit(tmp_path_factory, state):
+    run = RunFolder.create(tmp_path_factory.mktemp("runs") / "run", {})
+    save_checkpoint(run, 1, state)
+    assert same(load_checkpoint(run).state, state)
+
+
+@given(STATES)
+def test_the_plain_part_is_valid_json(state):
+    tree, arrays = pack(state)
+    assert same(unpack(json.loads(json.dumps(tree, allow_nan=False)), arrays), state)
+
+
+def test_arrays_in_any_memory_order_and_names_that_meet(run):
+    order = np.arange(6.0).reshape(2, 3).T
+    state = {"x": {"a/b": order, "a": {"b": order[::2]}, "__metadata__": np.zeros(0)}}
+    save_checkpoint(run, 1, state)
+    loaded = load_checkpoint(run).state
+    assert same(loaded, state)
+    loaded["x"]["a/b"][0] = 7  # what is loaded can be gone on with
+    assert order[0, 0] == 0
+
+
+def test_one_part_is_read_alone(run):
+    save_checkpoint(run, 5, a_state(5))
+    (run.checkpoints / "000000005" / "memory.safetensors").unlink()
+    weights = read_arrays(run, "q_network")
+    assert list(weights) == ["bias", "head.weight"]
+    assert weights["head.weight"].tolist() == [[5, 5]] * 3
+    with pytest.raises(InputError, match=r"step 5 has no 'q_net'\. Did you mean 'q_network'\?"):
+        read_arrays(run, "q_net")
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"),
+    [
+        ((1, 2), "tuple"),
+        (np.zeros(2, np.complex128), "array of complex128"),
+        (np.zeros(2, ">f4"), "array of >f4"),
+        (np.array([None]), "array of object"),
+        ({1: 2}, "dict"),
+        ({"$array": "x"}, "dict"),
+        (np.float32(1), "float32"),
+        (object(), "object"),
+    ],
+)
+def test_what_would_not_come_back_is_refused_before_anything_is_written(run, value, kind):
+    with pytest.raises(InputError, match=rf"'a/b/0' is of type {kind}, which cannot be saved\."):
+        save_checkpoint(run, 1, {"a": {"b": [value]}})
+    assert not files(run.checkpoints)
+
+
+@pytest.mark.parametrize("name", ["../x", "", ".x", "a/b", "x" * 101, "a\n"])
+def test_names_that_lead_elsewhere_are_refused(run, name):
+    with pytest.raises(InputError, match="cannot name a file"):
+        save_checkpoint(run, 1, {name: np.zeros(2)})
+    with pytest.raises(InputError, match="cannot name a file"):
+        save_checkpoint(run, 1, {}, {name: b"x"})
+
+
+# ---- what is kept ------------------------------------------------------------------------------
+
+
+def test_blocks_are_written_once_and_deleted_with_the_last_checkpoint_that_needs_them(run):
+    save_checkpoint(run, 1, a_state(1), some_blocks(1, 2))
+    times = {path: path.stat().st_mtime_ns for path in run.replay.iterdir()}
+    save_checkpoint(run, 2, a_state(2), some_blocks(2, 3))
+    assert len(times) == 2
+    assert all(path.stat().st_mtime_ns == time for path, time in times.items())
+    assert len(files(run.replay)) == 3
+    save_checkpoint(run, 3, a_state(3), some_blocks(3, 4))
+    assert checkpoint_steps(run) == [2, 3]
+    assert [name.split("-")[1] for name in files(run.replay)] == ["000002", "000003", "000004"]
+    for step, numbers in ((2, (2, 3)), (3, (3, 4))):
+        loaded = load_checkpoint(run, step)
+        assert loaded.step == step
+        assert loaded.blocks == some_blocks(*numbers)
+        assert same(loaded.state, a_state(step))
+
+
+def test_going_back_replaces_what_came_after(run):
+    for step in (1, 2):
+        save_checkpoint(run, step, a_state(step), some_blocks(step))
+    other = {"0-000002": b"another past"}  # under the same name as before
+    save_checkpoint(run, 2, a_state(9), other)
+    assert checkpoint_steps(run) == [1, 2]
+    assert load_checkpoint(run).blocks == other
+    assert load_checkpoint(run).state["progress"]["agent_steps"] == 9
+    assert load_checkpoint(run, 1).blocks == some_blocks(1)
+    save_checkpoint(run, 1, a_state(1), some_blocks(1))
+    assert checkpoint_steps(run) == [1]
+    assert len(files(run.checkpoints)) == len(files(run.replay)) == 1
+
+
+def test_a_run_without_a_checkpoint_says_so(run):
+    with pytest.raises(InputError, match=r"has no checkpoint: it ended before the first one\."):
+        load_checkpoint(run)
+    save_checkpoint(run, 1, {})
+    with pytest.raises(InputError, match=r"no checkpoint at step 3\. There are: 1\."):
+        load_checkpoint(run, 3)
+
+
+# ---- what is torn ------------------------------------------------------------------------------
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("damage", [cut, flip, Path.unlink], ids=lambda damage: damage.__name__)
+@pytest.mark.parametrize(
+    "name",
+    ["index.json", "state.json", "q_network.safetensors", "memory.safetensors", "block"],
+)
+def test_a_torn_checkpoint_is_named_and_never_skipped(run, name, damage):
+    for step in (1, 2):
+        save_checkpoint(run, step, a_state(step), some_blocks(step))
+    folder = run.checkpoints / "000000002"
+    path = next(run.replay.glob("0-000002*")) if name == "block" else folder / name
+    damage(path)
+    with pytest.raises(TrdlabError) as caught:
+        load_checkpoint(run)
+    assert str(caught.value).startswith("The checkpoint at step 2 cannot be used: '")
+    assert path.name[:8] in str(caught.value)
+    assert str(caught.value).endswith("The one at step 1 is whole: --checkpoint 1.")
+    assert same(load_checkpoint(run, 1).state, a_state(1))
+    save_checkpoint(run, 2, a_state(2), some_blocks(2))  # the run goes on from there
+    assert same(load_checkpoint(run).state, a_state(2))
+
+
+def test_advice_is_given_only_where_it_holds(run):
+    for step in (1, 2):
+        save_checkpoint(run, step, a_state(step))
+        cut(run.checkpoints / f"00000000{step}" / "state.json")
+    with pytest.raises(TrdlabError, match=r"state\.json' has \d+ bytes instead of \d+\. No other"):
+        load_checkpoint(run)
+
+
+def test_a_doctored_index_leads_nowhere(run, tmp_path):
+    save_checkpoint(run, 1, a_state(1))
+    (tmp_path / "secret").write_bytes(b"")
+    index = run.checkpoints / "000000001" / "index.json"
+    for part in ("files", "blocks"):
+        doctored = {"files": {}, "blocks": {}, part: {"../../secret": [0, 0]}}
+        index.write_text(json.dumps(doctored))
+        with pytest.raises(TrdlabError, match=r"has a file named '\.\./\.\./secret'"):
+            load_checkpoint(run)
+    for doctored in ("[]", "{}", '{"files": {"a": 1}}', "[" * 100_000, '{"files": 1}'):
+        index.write_text(doctored)
+        with pytest.raises(TrdlabError, match=r"index\.json' is torn"):
+            load_checkpoint(run)

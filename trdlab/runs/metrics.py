@@ -1,0 +1,162 @@
+"""Metrics: a file with one JSON object a line, growing while the run goes on."""
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from trdlab.errors import InputError, OutputError, TrdlabError
+
+Row = Mapping[str, str | float | bool | None]
+NON_FINITE = "non_finite"
+"""Where a line names the numbers that JSON cannot hold, and that are null there."""
+TAIL_NBYTES = 65536
+
+
+class MetricsFile:
+    """Appends lines of metrics, each on its way to the disk before `append` returns.
+
+    Args:
+        path: the file; it is made if it is not there.
+        length: the bytes to go on after, from a checkpoint: what an interrupted run wrote
+            later is cut off, because it will be written again. Without it, nothing is cut off.
+
+    Raises:
+        TrdlabError: the file is shorter than that.
+        OutputError: it cannot be written.
+    """
+
+    def __init__(self, path: Path, length: int | None = None) -> None:
+        self.path = path
+        try:
+            self._file = path.open("ab", buffering=0)
+            self._length = os.fstat(self._file.fileno()).st_size
+            if length is not None:
+                self._cut(length)
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def append(self, row: Row) -> None:
+        """Writes one line.
+
+        Raises:
+            InputError: a value is not a number, a text, true, false or None.
+            OutputError: the disk is full. What was written before is whole.
+        """
+        line = memoryview(_line(row).encode())
+        try:
+            written = 0
+            while written < len(line):  # a disk that is just full takes a part first
+                written += self._file.write(line[written:])
+        except OSError as error:
+            with suppress(OSError):
+                self._file.truncate(self._length)
+            raise self._cannot_write(error) from error
+        self._length += len(line)
+
+    def sync(self) -> int:
+        """Waits until all lines are on the disk, and returns their length for a checkpoint."""
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._cannot_write(error) from error
+        return self._length
+
+    def close(self) -> None:
+        """Ends writing."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _cut(self, length: int) -> None:
+        if length > self._length:
+            self.close()
+            raise TrdlabError(
+                f"'{self.path}' has {self._length} bytes, and had {length} at the checkpoint.",
+                "Put the lines back, or go back to an earlier checkpoint with --checkpoint STEP.",
+            )
+        self._file.truncate(length)
+        self._length = length
+
+    def _cannot_write(self, error: OSError) -> OutputError:
+        return OutputError(
+            f"Cannot write '{self.path}': {error.strerror or error}.", "Make room, and resume."
+        )
+
+
+def read_metrics(path: Path) -> list[dict[str, Any]]:
+    """Returns the lines of a metrics file; one that is still being written is left out.
+
+    Raises:
+        TrdlabError: it cannot be read, or a line in the middle is torn.
+    """
+    return _rows(path, 0)
+
+
+def last_metrics(path: Path) -> dict[str, Any]:
+    """Returns the last whole line of a metrics file, without reading all of it; empty if none.
+
+    Raises:
+        TrdlabError: it cannot be read.
+    """
+    rows = _rows(path, TAIL_NBYTES)
+    return rows[-1] if rows else {}
+
+
+def _line(row: Row) -> str:
+    """Returns one line of JSON.
+
+    >>> _line({"agent_steps": 8, "loss": math.nan}).strip()
+    '{"agent_steps": 8, "loss": null, "non_finite": {"loss": "nan"}}'
+    """
+    plain: dict[str, Any] = {}
+    non_finite = {}
+    for name, value in row.items():
+        if not isinstance(value, str | int | float | None) or name == NON_FINITE:
+            raise InputError(
+                f"The metric '{name}' is {value!r}.", "Metrics are plain numbers and texts."
+            )
+        plain[name] = value
+        if isinstance(value, float) and not math.isfinite(value):
+            plain[name], non_finite[name] = None, repr(float(value))
+    if non_finite:
+        plain[NON_FINITE] = non_finite
+    return json.dumps(plain, allow_nan=False) + "\n"
+
+
+def _rows(path: Path, tail: int) -> list[dict[str, Any]]:
+    """Returns the lines, or those that begin in the last `tail` bytes."""
+    try:
+        with path.open("rb") as file:
+            start = max(0, os.fstat(file.fileno()).st_size - tail) if tail else 0
+            file.seek(start)
+            lines = file.read().split(b"\n")[:-1]  # without a line's end, it is not whole
+    except OSError as error:
+        reason = error.strerror or error
+        raise TrdlabError(f"'{path}' cannot be read: {reason}.") from error
+    if start:
+        lines = lines[1:]
+    return [_row(line, f"'{path}', line {at} of those read") for at, line in enumerate(lines, 1)]
+
+
+def _row(line: bytes, where: str) -> dict[str, Any]:
+    try:
+        row = dict(json.loads(line))
+        for name, value in row.pop(NON_FINITE, {}).items():
+            row[name] = float(value)
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        raise TrdlabError(f"{where}, is torn.", "Delete that line.") from error
+    return row

@@ -7,6 +7,7 @@ import typer
 from trdlab import __version__
 from trdlab.cli.gridworld import gridworld
 from trdlab.cli.tabular import tabular
+from trdlab.cli.train import evaluate, resume, runs, train
 
 app = typer.Typer(
     name="trdlab",
@@ -17,6 +18,10 @@ app = typer.Typer(
 )
 app.command()(gridworld)
 app.command()(tabular)
+app.add_typer(train, name="train")
+app.command()(resume)
+app.command()(evaluate)
+app.command()(runs)
 
 
 def _print_version(wanted: bool) -> None:

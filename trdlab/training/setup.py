@@ -1,25 +1,58 @@
 """What a run is made of, from its settings: the environments, the device, the plan."""
 
 import os
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 
-from trdlab.deep.settings import TrainSettings
+from trdlab.deep.presets import preset
+from trdlab.deep.settings import Kind, TrainSettings
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.stack import observation_space
 from trdlab.errors import InputError
 from trdlab.estimator import Future
+from trdlab.runs import free_name, read_config
 
 if TYPE_CHECKING:
     from trdlab.deep.trainer import Trainer
 
 _MEASURED_SECONDS = 3.0
+
+
+def read_settings(
+    kind: Kind,
+    env: str,
+    preset_name: str | None,
+    config: Path | None,
+    given: Mapping[str, Any],
+) -> TrainSettings:
+    """Returns settings from a preset, then a file, then single options; later ones win.
+
+    Raises:
+        InputError: there is no such preset or file, or a key or value cannot be used.
+    """
+    settings = preset(kind, env, preset_name)
+    if config is not None:
+        lines = read_config(config)
+        for key, here in (("kind", kind), ("env", env)):
+            if lines.pop(key, here) != here:
+                raise InputError(f"'{config}' is for another {key}.", f"Here it is '{here}'.")
+        settings = settings.changed(lines, f"'{config}'")
+    return settings.changed(given, "The command")
+
+
+def default_path(settings: TrainSettings) -> Path:
+    """Returns a folder for a run that does not exist yet, named after what it learns."""
+    env = re.sub(r"[^A-Za-z0-9.-]+", "-", settings.env.rpartition("/")[2])
+    stem = f"{env}-N{settings.horizon}-w{settings.width}-seed{settings.seed}"
+    return free_name(Path("runs"), stem)
 
 
 def make_environments(

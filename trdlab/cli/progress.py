@@ -1,0 +1,131 @@
+"""How long work is watched, and stopped: a bar on a terminal, now and then a line elsewhere."""
+
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+if TYPE_CHECKING:
+    from trdlab.deep.trainer import Trainer, TrainMetrics
+
+_LINE_SECONDS = 10.0
+_BAR_SECONDS = 0.1
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Stop:
+    """Whether the user, or the system, has asked to stop; `code` is what to exit with then."""
+
+    code: int | None = None
+
+    def __call__(self) -> bool:
+        return self.code is not None
+
+
+@contextmanager
+def stopping() -> Iterator[Stop]:
+    """Turns Ctrl-C and SIGTERM into a request; the second one ends the process at once."""
+    stop = Stop()
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        stop.code = 128 + number
+        for each in _SIGNALS:
+            signal.signal(each, before[each])
+
+    for number in _SIGNALS:
+        signal.signal(number, ask)
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class TrainingProgress:
+    """Shows a training run: steps, speed, time left, score and loss.
+
+    Args:
+        console: where to; a bar if it is a terminal, otherwise a line now and then.
+        total: the agent steps of the whole run.
+        done: those taken before.
+    """
+
+    def __init__(self, console: Console, total: int, done: int = 0) -> None:
+        self._console, self._total = console, total
+        self._first, self._begun = done, time.monotonic()
+        self._shown, self._state = 0.0, "score –  loss –"
+        self._bar: Progress | None = None
+        if console.is_terminal:
+            columns: tuple[Any, ...] = (
+                BarColumn(bar_width=None),
+                TextColumn("{task.fields[steps]}"),
+                TimeRemainingColumn(compact=True),
+                TextColumn("{task.fields[state]}", markup=False),
+            )
+            self._bar = Progress(*columns, console=console, expand=True, transient=True)
+            self._task = self._bar.add_task(
+                "", total=total, completed=done, steps="", state=self._state
+            )
+
+    def __enter__(self) -> "TrainingProgress":
+        if self._bar is not None:
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def on_metrics(self, metrics: "TrainMetrics") -> None:
+        """Takes note of score and loss."""
+        score = "–" if metrics.score is None else f"{metrics.score:.4g}"
+        loss = "–" if metrics.loss is None else f"{metrics.loss:.3g}"
+        self._state = f"score {score}  loss {loss}"
+
+    def on_step(self, trainer: "Trainer") -> None:
+        """Shows where the run stands, if it is time to."""
+        now = time.monotonic()
+        if now - self._shown < (_BAR_SECONDS if self._bar else _LINE_SECONDS):
+            return
+        self._shown = now
+        done = trainer.agent_steps
+        steps = f"{done:,} of {self._total:,} steps  {self._speed(done, now)}"
+        if self._bar is not None:
+            self._bar.update(self._task, completed=done, steps=steps, state=self._state)
+        else:
+            self._console.print(f"{steps}  {self._state}", soft_wrap=True, markup=False)
+
+    def _speed(self, done: int, now: float) -> str:
+        passed = now - self._begun
+        return f"{(done - self._first) / passed:,.0f}/s" if passed > 1.0 else ""
+
+
+class EpisodeProgress:
+    """Shows an evaluation: the episodes that have finished, on a terminal only.
+
+    Args:
+        console: where to.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._status = console.status("Evaluating") if console.is_terminal else None
+
+    def __enter__(self) -> "EpisodeProgress":
+        if self._status is not None:
+            self._status.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._status is not None:
+            self._status.stop()
+
+    def on_episode(self, finished: int) -> None:
+        """Shows how many have finished."""
+        if self._status is not None:
+            self._status.update(f"Evaluating: {finished} episodes have finished")

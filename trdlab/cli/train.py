@@ -1,0 +1,213 @@
+"""`trdlab train`, `resume`, `evaluate`, `runs`: a network that decomposes, start to score."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from trdlab.cli import common
+from trdlab.cli.options import with_settings
+
+if TYPE_CHECKING:
+    from trdlab.deep.settings import Kind
+    from trdlab.training.run import Run
+
+train = typer.Typer(help="Train a network that decomposes.", no_args_is_help=True)
+
+Preset = Annotated[str | None, typer.Option("--preset", help="Named settings to begin from.")]
+ConfigFile = Annotated[
+    Path | None, typer.Option("--config", metavar="FILE", help="Settings in a .toml file.")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", help="The run's folder.", show_default="a new one in runs"
+    ),
+]
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Say what it would take, and write nothing.")
+]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="The run's folder.")]
+Checkpoint = Annotated[
+    int | None,
+    typer.Option("--checkpoint", metavar="STEP", help="An older one.", show_default="the newest"),
+]
+
+
+@train.command(name="gym")
+@with_settings("gym")
+def train_gym(
+    env_id: Annotated[
+        str,
+        typer.Argument(
+            metavar="ENV_ID",
+            help="A Gymnasium environment with discrete actions, such as CartPole-v1 or "
+            "trdlab/DroneGridworld-v0; or MODULE:ENV_ID, to import a module first.",
+        ),
+    ],
+    preset: Preset = None,
+    config: ConfigFile = None,
+    out: Out = None,
+    dry_run: DryRun = False,
+    verbose: common.Verbose = False,
+    given: dict[str, Any] | None = None,
+) -> None:
+    """Train on a Gymnasium environment.
+
+    Settings come from the preset, then from --config, then from the options.
+    """
+    _train("gym", env_id, preset, config, out, dry_run, given or {})
+
+
+@train.command(name="atari")
+@with_settings("atari")
+def train_atari(
+    game: Annotated[str, typer.Argument(metavar="GAME", help="An Atari game, such as Breakout.")],
+    preset: Preset = None,
+    config: ConfigFile = None,
+    out: Out = None,
+    dry_run: DryRun = False,
+    verbose: common.Verbose = False,
+    given: dict[str, Any] | None = None,
+) -> None:
+    """Train on an Atari game: 84×84 grey, frame skip 4, stacks of 4.
+
+    Settings come from the preset, then from --config, then from the options.
+    """
+    _train("atari", game, preset, config, out, dry_run, given or {})
+
+
+def resume(run: RunPath, checkpoint: Checkpoint = None, verbose: common.Verbose = False) -> None:
+    """Go on with a run that was stopped, exactly as if it had not been."""
+    from trdlab.training.run import resume as pick_up
+
+    _carry_on(lambda: pick_up(run, checkpoint))
+
+
+def evaluate(
+    run: RunPath,
+    episodes: Annotated[
+        int | None,
+        typer.Option("--episodes", min=1, help="How many.", show_default="as configured"),
+    ] = None,
+    epsilon: Annotated[
+        float | None,
+        typer.Option(
+            "--epsilon",
+            min=0,
+            max=1,
+            help="Chance of a random action.",
+            show_default="as configured",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")] = 1000,
+    checkpoint: Checkpoint = None,
+    as_json: common.AsJson = False,
+    verbose: common.Verbose = False,
+) -> None:
+    """Play whole episodes with a run's agent, and say how well it does.
+
+    The score is the plain sum of the rewards that the environment pays.
+    """
+    from trdlab.cli.progress import EpisodeProgress
+    from trdlab.show.training import evaluation_page
+    from trdlab.training.loading import evaluate_run
+
+    errors = _errors()
+    with EpisodeProgress(errors) as progress:
+        result, kept = evaluate_run(
+            run,
+            episodes=episodes,
+            epsilon=epsilon,
+            seed=seed,
+            step=checkpoint,
+            on_episode=progress.on_episode,
+        )
+    if as_json:
+        common.print_json(result.to_dict())
+    else:
+        console, ascii_only = common.new_console()
+        console.print(evaluation_page(result, ascii_only=ascii_only))
+    _say(errors, f"Kept: {kept}")
+
+
+def runs(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where runs are kept.")] = Path(
+        "runs"
+    ),
+    verbose: common.Verbose = False,
+) -> None:
+    """List the runs in a folder: what they learn, how far they are, and their score."""
+    from trdlab.runs import list_runs
+    from trdlab.show.training import runs_table
+
+    console, ascii_only = common.new_console()
+    found = list_runs(folder)
+    if found:
+        console.print(runs_table(found, ascii_only=ascii_only))
+    else:
+        console.print(f"There are no runs in '{folder}'.", soft_wrap=True, markup=False)
+
+
+def _train(
+    kind: "Kind",
+    env: str,
+    preset_name: str | None,
+    config: Path | None,
+    out: Path | None,
+    dry_run: bool,
+    given: dict[str, Any],
+) -> None:
+    from trdlab.training.run import begin
+    from trdlab.training.setup import default_path, plan, read_settings
+
+    settings = read_settings(kind, env, preset_name, config, given)
+    if dry_run:
+        from trdlab.show.training import plan_page
+
+        console, ascii_only = common.new_console()
+        console.print(plan_page(plan(settings), ascii_only=ascii_only))
+        return
+    _carry_on(lambda: begin(settings, out or default_path(settings)))
+
+
+def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
+    """Trains a run to its end or to the next signal, and evaluates it at the end."""
+    from shlex import quote
+
+    from trdlab.cli.progress import TrainingProgress, stopping
+    from trdlab.show.training import duration
+    from trdlab.training.run import carry_on
+
+    errors = _errors()
+    with stopping() as stop, open_run() as run:
+        path, settings = run.folder.path, run.trainer.settings
+        _say(errors, f"Run: {path}")
+        if run.problem is not None:
+            _say(errors, f"{run.problem.cause} New episodes are begun in their place.")
+        with TrainingProgress(errors, settings.agent_steps, run.trainer.agent_steps) as progress:
+            done = carry_on(
+                run,
+                on_metrics=progress.on_metrics,
+                on_step=progress.on_step,
+                should_stop=stop,
+            )
+        steps = run.trainer.agent_steps
+        if not done:
+            _say(errors, f"Stopped and saved at {steps:,} agent steps.")
+            _say(errors, f"Go on: trdlab resume {quote(str(path))}")
+            raise typer.Exit(stop.code or 0)
+    _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
+    if settings.evaluate_episodes:
+        evaluate(path)
+
+
+def _errors() -> Console:
+    return Console(stderr=True, highlight=False)
+
+
+def _say(console: Console, text: str) -> None:
+    console.print(text, soft_wrap=True, markup=False)

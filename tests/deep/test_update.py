@@ -85,7 +85,8 @@ def test_without_explicit_components_updates_are_those_of_dqn():
     online, target = (
         nn.Sequential(nn.Linear(3, 16), nn.ReLU(), nn.Linear(16, 2)) for _ in range(2)
     )
-    start = dict(zip(online.state_dict(), ours.q_network.state_dict().values(), strict=True))
+    own = [weight.detach() for weight in ours.q_network.parameters()]
+    start = dict(zip(online.state_dict(), own, strict=True))
     online.load_state_dict(start)
     target.load_state_dict(start)
     adam = torch.optim.Adam(online.parameters(), lr=1e-2)

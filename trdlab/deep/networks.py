@@ -61,6 +61,12 @@ class DecompositionNetwork(nn.Module):
         """Returns observations `[B, ...]` as the floating-point inputs of the first layer."""
         raise NotImplementedError
 
+    def standardize(self, observations: Tensor) -> None:
+        """Takes note of how observations `[B, ...]` spread, where their scale is not known.
+
+        Images and indices have a known one: nothing is done.
+        """
+
     def components(self, inputs: Tensor) -> Tensor:
         """Returns the components `[B, A, N+1]` of preprocessed inputs."""
         flat: Tensor = self.head(self.body(inputs))  # [B, ...] -> [B, F] -> [B, A·(N+1)]
@@ -133,8 +139,11 @@ class VectorNetwork(DecompositionNetwork):
         rng: what the weights are drawn from.
         num_states: where observations are indices, how many there are: they become one-hot.
         first_state: the least index.
-        scale: what observations are multiplied with.
+        in_bytes: whether observations are bytes, whose scale is known: they become 0 to 1.
     """
+
+    mean: Tensor  # [F], what inputs are moved by
+    scale: Tensor  # [F], and then multiplied with; both are saved with the weights
 
     def __init__(
         self,
@@ -146,7 +155,7 @@ class VectorNetwork(DecompositionNetwork):
         rng: torch.Generator,
         num_states: int | None = None,
         first_state: int = 0,
-        scale: float = 1.0,
+        in_bytes: bool = False,
     ) -> None:
         num_inputs = math.prod(observation_shape) if num_states is None else num_states
         sizes = [num_inputs, *hidden]
@@ -155,13 +164,16 @@ class VectorNetwork(DecompositionNetwork):
             body.append(linear(size, following, rng)).append(nn.ReLU())
         head = linear(sizes[-1], num_actions * num_components, rng)
         super().__init__(body, head, observation_shape, num_actions, num_components)
-        self.num_states, self.first_state, self.scale = num_states, first_state, scale
+        self.num_states, self.first_state = num_states, first_state
+        self.in_bytes = in_bytes
+        self.register_buffer("mean", torch.zeros(num_inputs))
+        self.register_buffer("scale", torch.full((num_inputs,), 1 / 255 if in_bytes else 1.0))
 
     def preprocess(self, observations: Tensor) -> Tensor:
         """Returns `[B, F]`: flattened, or one-hot."""
         self._check_shape(observations)
         if self.num_states is None:
-            return observations.flatten(1).float() * self.scale  # [B, F]
+            return (observations.flatten(1).float() - self.mean) * self.scale  # [B, F]
         if observations.is_floating_point():
             raise InputError(
                 f"The states have type {str(observations.dtype).removeprefix('torch.')}.",
@@ -175,6 +187,18 @@ class VectorNetwork(DecompositionNetwork):
                 f"{self.first_state + self.num_states - 1}.",
             )
         return nn.functional.one_hot(states, self.num_states).float()  # [B, S]
+
+    def standardize(self, observations: Tensor) -> None:
+        """Moves and scales inputs to mean 0 and deviation 1 over observations `[B, ...]`.
+
+        An input that does not vary in them is moved, not scaled.
+        """
+        if self.num_states is not None or self.in_bytes:
+            return
+        inputs = observations.flatten(1).double()  # [B, F]
+        deviation = inputs.std(dim=0, correction=0)  # [F]
+        self.mean.copy_(inputs.mean(dim=0))
+        self.scale.copy_(torch.where(deviation > 0.0, 1.0 / deviation, 1.0))
 
 
 def build_network(
@@ -228,9 +252,7 @@ def build_network(
                 f"Give (channels, height, width), both sides at least {LEAST_SIDE}.",
             )
         return NatureNetwork(shape, *outputs, rng=rng, channels_last=channels_last)
-    return VectorNetwork(
-        shape, *outputs, hidden=hidden, rng=rng, scale=1 / 255 if in_bytes else 1.0
-    )
+    return VectorNetwork(shape, *outputs, hidden=hidden, rng=rng, in_bytes=in_bytes)
 
 
 def count_actions(action_space: gym.Space[Any]) -> int:

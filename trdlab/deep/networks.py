@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.layers import (
     LEAST_SIDE,
@@ -19,6 +20,8 @@ from trdlab.deep.layers import (
     side_after_convolutions,
 )
 from trdlab.errors import InputError
+
+_UNBOUNDED = 1e6  # wider bounds are those of a number format, not of a quantity
 
 
 class DecompositionNetwork(nn.Module):
@@ -60,12 +63,6 @@ class DecompositionNetwork(nn.Module):
     def preprocess(self, observations: Tensor) -> Tensor:
         """Returns observations `[B, ...]` as the floating-point inputs of the first layer."""
         raise NotImplementedError
-
-    def standardize(self, observations: Tensor) -> None:
-        """Takes note of how observations `[B, ...]` spread, where their scale is not known.
-
-        Images and indices have a known one: nothing is done.
-        """
 
     def components(self, inputs: Tensor) -> Tensor:
         """Returns the components `[B, A, N+1]` of preprocessed inputs."""
@@ -139,10 +136,11 @@ class VectorNetwork(DecompositionNetwork):
         rng: what the weights are drawn from.
         num_states: where observations are indices, how many there are: they become one-hot.
         first_state: the least index.
-        in_bytes: whether observations are bytes, whose scale is known: they become 0 to 1.
+        bounds: `[F]` twice, the least and the largest value of each input: they become −1 and 1.
+            An input without finite ones is taken as it is.
     """
 
-    mean: Tensor  # [F], what inputs are moved by
+    middle: Tensor  # [F], what inputs are moved by
     scale: Tensor  # [F], and then multiplied with; both are saved with the weights
 
     def __init__(
@@ -155,7 +153,7 @@ class VectorNetwork(DecompositionNetwork):
         rng: torch.Generator,
         num_states: int | None = None,
         first_state: int = 0,
-        in_bytes: bool = False,
+        bounds: tuple[FloatArray, FloatArray] | None = None,
     ) -> None:
         num_inputs = math.prod(observation_shape) if num_states is None else num_states
         sizes = [num_inputs, *hidden]
@@ -165,15 +163,19 @@ class VectorNetwork(DecompositionNetwork):
         head = linear(sizes[-1], num_actions * num_components, rng)
         super().__init__(body, head, observation_shape, num_actions, num_components)
         self.num_states, self.first_state = num_states, first_state
-        self.in_bytes = in_bytes
-        self.register_buffer("mean", torch.zeros(num_inputs))
-        self.register_buffer("scale", torch.full((num_inputs,), 1 / 255 if in_bytes else 1.0))
+        middle, scale = np.zeros(num_inputs), np.ones(num_inputs)
+        if bounds is not None:
+            known = (bounds[1] - bounds[0] < _UNBOUNDED) & (bounds[1] > bounds[0])
+            low, high = bounds[0][known], bounds[1][known]
+            middle[known], scale[known] = (low + high) / 2.0, 2.0 / (high - low)
+        self.register_buffer("middle", torch.as_tensor(middle, dtype=torch.float32))
+        self.register_buffer("scale", torch.as_tensor(scale, dtype=torch.float32))
 
     def preprocess(self, observations: Tensor) -> Tensor:
         """Returns `[B, F]`: flattened, or one-hot."""
         self._check_shape(observations)
         if self.num_states is None:
-            return (observations.flatten(1).float() - self.mean) * self.scale  # [B, F]
+            return (observations.flatten(1).float() - self.middle) * self.scale  # [B, F]
         if observations.is_floating_point():
             raise InputError(
                 f"The states have type {str(observations.dtype).removeprefix('torch.')}.",
@@ -188,18 +190,6 @@ class VectorNetwork(DecompositionNetwork):
             )
         return nn.functional.one_hot(states, self.num_states).float()  # [B, S]
 
-    def standardize(self, observations: Tensor) -> None:
-        """Moves and scales inputs to mean 0 and deviation 1 over observations `[B, ...]`.
-
-        An input that does not vary in them is moved, not scaled.
-        """
-        if self.num_states is not None or self.in_bytes:
-            return
-        inputs = observations.flatten(1).double()  # [B, F]
-        deviation = inputs.std(dim=0, correction=0)  # [F]
-        self.mean.copy_(inputs.mean(dim=0))
-        self.scale.copy_(torch.where(deviation > 0.0, 1.0 / deviation, 1.0))
-
 
 def build_network(
     observation_space: gym.Space[Any],
@@ -212,9 +202,9 @@ def build_network(
 ) -> DecompositionNetwork:
     """Returns the network that fits an observation space, with weights drawn from a seed.
 
-    Images (uint8, channels first) are read by the Nature CNN; any other Box is flattened, and a
-    Discrete space becomes one-hot, for an MLP. Weights and biases are uniform in ±1/√fan-in, as
-    PyTorch draws them; its global generator is neither used nor moved.
+    Images (uint8, channels first) are read by the Nature CNN; any other Box is flattened and scaled
+    by its bounds, and a Discrete space becomes one-hot, for an MLP. Weights and biases are uniform
+    in ±1/√fan-in, as PyTorch draws them; its global generator is neither used nor moved.
 
     Args:
         observation_space: of one observation.
@@ -252,7 +242,9 @@ def build_network(
                 f"Give (channels, height, width), both sides at least {LEAST_SIDE}.",
             )
         return NatureNetwork(shape, *outputs, rng=rng, channels_last=channels_last)
-    return VectorNetwork(shape, *outputs, hidden=hidden, rng=rng, in_bytes=in_bytes)
+    low, high = observation_space.low, observation_space.high
+    bounds = low.astype(np.float64).ravel(), high.astype(np.float64).ravel()
+    return VectorNetwork(shape, *outputs, hidden=hidden, rng=rng, bounds=bounds)
 
 
 def count_actions(action_space: gym.Space[Any]) -> int:

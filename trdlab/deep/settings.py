@@ -99,9 +99,6 @@ class TrainSettings:
     )
     double: bool = _option(False, "Double DQN: the online network chooses.", "Learning")
     bf16: bool = _option(False, "Compute in bfloat16: quicker, less exact.", "Learning")
-    standardize: bool = _option(
-        True, "Scale vectors by how they spread before the first update.", "Learning"
-    )
     hidden: tuple[int, ...] = _option((128, 128), "Layers of the MLP, for vectors.", "Learning")
     capacity: int = _option(100_000, "Transitions that the replay memory holds.", "Learning")
     clip_rewards: bool = _option(False, "Learn from the sign of each reward.", "Reward and ending")

@@ -21,8 +21,6 @@ from trdlab.deep.update import Learner
 from trdlab.environments import Environments, NotReproducible, Step
 from trdlab.environments.stack import FrameStack, observation_space
 
-_STANDARDIZED = 4096  # observations, of those before the first update
-
 
 @dataclass(frozen=True)
 class TrainMetrics:
@@ -151,10 +149,6 @@ class Trainer:
 
     def _learn(self) -> None:
         due = self.settings.updates_due(self.agent_steps)
-        if self.learner.num_updates == 0 < due and self.settings.standardize:
-            seen = self.memory.sample(_STANDARDIZED, self.rng).observations
-            self.learner.q_network.standardize(torch.as_tensor(seen))
-            self.learner.sync_target()
         if self.learner.num_updates < due:
             self.learner.set_learning_rate(self.settings.learning_rate_at(self.agent_steps))
         while self.learner.num_updates < due:

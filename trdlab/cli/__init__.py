@@ -11,12 +11,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Runs `trdlab`; exits with 0, with 2 for wrong usage or input, or with 1 for a failure."""
     import typer
 
-    from trdlab.cli.app import app
+    from trdlab.cli.app import new_app
 
     words = sys.argv[1:] if arguments is None else list(arguments)
     usage_error: Any = typer.BadParameter.__base__  # it has no public name in all versions
     try:
-        code = app(words, prog_name="trdlab", standalone_mode=False)
+        code = new_app(words)(words, prog_name="trdlab", standalone_mode=False)
     except TrdlabError as error:
         if {"-v", "--verbose"} & set(words):
             raise

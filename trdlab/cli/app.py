@@ -1,27 +1,49 @@
-"""The `trdlab` command and what all its commands share."""
+"""The `trdlab` command, put together from the modules of its commands."""
 
+from collections.abc import Sequence
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
 from trdlab import __version__
-from trdlab.cli.gridworld import gridworld
-from trdlab.cli.tabular import tabular
-from trdlab.cli.train import evaluate, resume, runs, train
 
-app = typer.Typer(
-    name="trdlab",
-    help="When does an agent expect which reward, and how far can that be trusted?",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.command()(gridworld)
-app.command()(tabular)
-app.add_typer(train, name="train")
-app.command()(resume)
-app.command()(evaluate)
-app.command()(runs)
+HELP = "When does an agent expect which reward, and how far can that be trusted?"
+COMMANDS = {
+    "gridworld": "trdlab.cli.gridworld",
+    "tabular": "trdlab.cli.tabular",
+    "train": "trdlab.cli.train",
+    "resume": "trdlab.cli.train",
+    "evaluate": "trdlab.cli.train",
+    "runs": "trdlab.cli.train",
+}
+"""The module of each command, where it is the function, or the group, of the same name."""
+
+
+def new_app(words: Sequence[str]) -> typer.Typer:
+    """Returns the command with those of its commands that these words can be for.
+
+    A command that is named costs only its own imports: `trdlab gridworld` starts in half a second
+    because it does not know of the others.
+
+    Args:
+        words: what stands behind `trdlab` on the command line.
+    """
+    app = typer.Typer(
+        name="trdlab",
+        help=HELP,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_options)
+    for name in words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS:
+        command = getattr(import_module(COMMANDS[name]), name)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        else:
+            app.command(name)(command)
+    return app
 
 
 def _print_version(wanted: bool) -> None:
@@ -30,11 +52,9 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
-def options(
+def _options(
     version: Annotated[
         bool,
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
-) -> None:
-    """When does an agent expect which reward, and how far can that be trusted?"""
+) -> None: ...

@@ -103,8 +103,8 @@ class GymEnvironments:
             NotReproducible: an environment does not do again what it did.
         """
         step = self._blank_step()
-        for env, actions in enumerate(self._histories.rewind(state)):
-            self._begin(env, step.following)
+        for env, (seeding, actions) in enumerate(self._histories.saved(state)):
+            self._begin(env, step.following, seeding)
             for action in actions:
                 self._act(env, action, step)
         self._histories.verify(state, self.env_id)
@@ -115,9 +115,9 @@ class GymEnvironments:
         for env in self._envs:
             env.close()
 
-    def _begin(self, env: int, frames: Frames) -> None:
+    def _begin(self, env: int, frames: Frames, seeding: int | None = None) -> None:
         """Begins an episode, its first frame into `frames [B, ...]`."""
-        observation, _ = self._envs[env].reset(seed=self._histories.begin(env))
+        observation, _ = self._envs[env].reset(seed=self._histories.begin(env, seeding))
         frame = np.asarray(observation)
         if not np.can_cast(frame.dtype, frames.dtype, "same_kind"):
             raise InputError(

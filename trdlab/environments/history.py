@@ -50,9 +50,14 @@ class Histories:
         self._actions = [array("i") for _ in range(num_envs)]
         self._checksums = [0] * num_envs
 
-    def begin(self, env: int) -> int:
-        """Forgets the past of an environment, and returns the seed to reset it with."""
-        self._seedings[env] += 1
+    def begin(self, env: int, seeding: int | None = None) -> int:
+        """Forgets the past of an environment, and returns the seed to reset it with.
+
+        Args:
+            env: which one.
+            seeding: k; by default the next one.
+        """
+        self._seedings[env] = self._seedings[env] + 1 if seeding is None else seeding
         self._actions[env] = array("i")
         self._checksums[env] = 0
         words = np.random.SeedSequence([self._seed, env, int(self._seedings[env])])
@@ -89,8 +94,8 @@ class Histories:
             "checksums": np.array(self._checksums, dtype=np.int64),  # [B]
         }
 
-    def rewind(self, state: Mapping[str, Any]) -> list[IntArray]:
-        """Goes back to the seeded resets of a saved state; returns the actions since, B arrays.
+    def saved(self, state: Mapping[str, Any]) -> list[tuple[int, IntArray]]:
+        """Returns what a saved state is played again from: k and actions of each environment.
 
         Raises:
             InputError: it was saved with other settings, or is torn.
@@ -108,8 +113,8 @@ class Histories:
                 f"The saved environments have {len(actions)} actions in place of {lengths.sum()}.",
                 "The file is torn: resume from an earlier one.",
             )
-        self._seedings[:] = np.asarray(state["seedings"]) - 1
-        return np.split(actions.astype(np.int64), np.cumsum(lengths)[:-1])
+        past = np.split(actions.astype(np.int64), np.cumsum(lengths)[:-1])
+        return list(zip(map(int, state["seedings"]), past, strict=True))
 
     def verify(self, state: Mapping[str, Any], name: str) -> None:
         """Compares what a replay has led to with what was saved.

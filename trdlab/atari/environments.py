@@ -1,0 +1,165 @@
+"""Atari games that step together, restorable to the bit."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, IntArray
+from trdlab.atari.names import find_game
+from trdlab.atari.vector import FRAME, FRAMES_PER_SECOND, STACK, action_names, make_vector
+from trdlab.environments.history import Histories, checked_actions
+from trdlab.environments.protocol import Frames, Padding, Step
+
+RESEED_AFTER = 5000
+"""Steps after which a game is seeded anew at the end of its episode.
+
+A seeded reset costs about 95 ms, because the ROM is loaded again, another one 6 ms; to restore the
+games costs all the steps since it.
+"""
+
+_UNSEEDED = -1  # to ale-py: the game's own chance goes on
+
+
+class AtariEnvironments:
+    """B games of one kind on ale-py's vector environment.
+
+    A frame is `(84, 84)` in grey; the agent stacks four, with zeros before the first one of an
+    episode, as the vector environment does it. Rewards are the game's own. An episode is a whole
+    game: a lost life is told in `life_lost`, and the game goes on.
+
+    Args:
+        game: its name, such as `Breakout`, `space_invaders` or `ALE/Breakout-v5`.
+        num_envs: B.
+        seed: what all seeds are drawn from.
+        sticky: the probability that the last action is repeated in place of the one given.
+        noop_max: episodes begin with fewer than so many idle frames (and FIRE, where there is one).
+        max_frames: of the emulator, after which an episode is truncated.
+        frame_skip: for how many frames an action is held; a frame shows the maximum of the last
+            two of them.
+        full_action_space: all 18 actions, in place of those that the game knows.
+
+    Raises:
+        InputError: there is no such game, or a value is out of its range.
+
+    >>> import numpy as np
+    >>> games = AtariEnvironments("Breakout", 2, seed=0)
+    >>> games.reset().shape, games.action_names
+    ((2, 84, 84), ('NOOP', 'FIRE', 'RIGHT', 'LEFT'))
+    >>> games.step(np.array([1, 3])).rewards.tolist()
+    [0.0, 0.0]
+    """
+
+    observation_space = FRAME
+    first_action = 0
+    stack: int | None = STACK
+    padding: Padding = "zero"
+    frames_per_second: float | None = FRAMES_PER_SECOND
+
+    def __init__(
+        self,
+        game: str,
+        num_envs: int = 1,
+        *,
+        seed: int,
+        sticky: float = 0.0,
+        noop_max: int = 30,
+        max_frames: int = 108_000,
+        frame_skip: int = 4,
+        full_action_space: bool = False,
+    ) -> None:
+        self.game, self.num_envs, self.frame_skip = find_game(game), num_envs, frame_skip
+        options: dict[str, Any] = {
+            "sticky": sticky,
+            "noop_max": noop_max,
+            "max_frames": max_frames,
+            "frame_skip": frame_skip,
+            "full_action_space": full_action_space,
+        }
+        settings = {"game": self.game, **options}
+        self._histories = Histories(
+            settings, num_envs=num_envs, seed=seed, reseed_after=RESEED_AFTER
+        )
+        self._envs = make_vector(self.game, num_envs, stack=1, **options)
+        self.action_names = action_names(self._envs)
+        self.num_actions = len(self.action_names)
+        self.time_limit: int | None = -(-max_frames // frame_skip)
+        self._lives = np.zeros(num_envs, dtype=np.int64)
+
+    def reset(self) -> Frames:
+        """Begins a game in every environment, and returns their first frames `[B, 84, 84]`."""
+        everyone = np.ones(self.num_envs, dtype=np.bool_)
+        return self._begin(everyone, [self._histories.begin(env) for env in range(self.num_envs)])
+
+    def step(self, actions: IntArray) -> Step:
+        """Takes actions `[B]`; where a game ends, the next one begins in the same call.
+
+        Raises:
+            InputError: there are not B actions, or one does not exist.
+        """
+        # checked here: an action that does not exist would hang ale-py's threads
+        return self._act(checked_actions(actions, self.num_envs, self.num_actions))
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns the seeds of the last seeded resets, and the actions taken since.
+
+        Raises:
+            TrdlabError: no game has begun.
+        """
+        return self._histories.state_dict()
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> Frames:
+        """Plays the saved games again; returns the frames the next action is chosen at.
+
+        Raises:
+            InputError: the state was saved with other settings, or is torn.
+            NotReproducible: a game does not do again what it did.
+        """
+        past = self._histories.saved(state)
+        lengths = np.array([len(actions) for _, actions in past])
+        waits = lengths.max() - lengths  # [B]: they begin apart, and come to the present together
+        padded = [
+            np.pad(actions, (wait, 0)) for (_, actions), wait in zip(past, waits, strict=True)
+        ]
+        following: Frames = self._envs.reset()[0]  # those that wait play something meanwhile
+        for moment in range(int(lengths.max()) + 1):
+            begins = waits == moment
+            if begins.any():
+                envs = np.flatnonzero(begins).tolist()
+                following = self._begin(
+                    begins, [self._histories.begin(env, past[env][0]) for env in envs]
+                )
+            if moment < lengths.max():
+                actions = np.array([row[moment] for row in padded])
+                following = self._act(actions).following
+        self._histories.verify(state, self.game)
+        return following
+
+    def close(self) -> None:
+        """Nothing: ale-py's threads end with the object."""
+
+    def _act(self, actions: IntArray) -> Step:
+        observations, paid, terminated, truncated, info = self._envs.step(actions)
+        frames, rewards = observations[:, 0], paid.astype(np.float64)  # [B, 84, 84], [B]
+        for env, action in enumerate(actions.tolist()):
+            self._histories.record_step(env, action, frames, rewards)
+        ended, lives = terminated | truncated, info["lives"]
+        life_lost = (lives < self._lives) & (lives > 0) & ~ended  # [B]; lives can also be won
+        self._lives, following = lives, frames
+        if ended.any():
+            following = self._begin(
+                ended, [self._next_seed(e) for e in np.flatnonzero(ended).tolist()]
+            )
+        return Step(frames, rewards, terminated, truncated, life_lost, following)
+
+    def _next_seed(self, env: int) -> int:
+        return self._histories.begin(env) if self._histories.is_due(env) else _UNSEEDED
+
+    def _begin(self, where: BoolArray, seeds: list[int]) -> Frames:
+        """Begins a game `where [B]`; returns `[B, 84, 84]`, the present frames of all."""
+        observations, info = self._envs.reset(seed=np.array(seeds), options={"reset_mask": where})
+        frames: Frames = observations[:, 0]  # [B, 84, 84]
+        self._lives = info["lives"]
+        for env in np.flatnonzero(where).tolist():
+            self._histories.record_reset(env, frames)
+        return frames

@@ -1,19 +1,27 @@
 """A gridworld as a Gymnasium environment: it samples from the exact model, which it carries."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import gymnasium as gym
 import numpy as np
+import numpy.typing as npt
 
 from trdlab.errors import InputError, TrdlabError, closest
 from trdlab.gridworld.gridmap import ACTIONS, GridMap, load_map
+from trdlab.gridworld.pixels import SIDE, pictures_of
 from trdlab.gridworld.world import Gridworld
 from trdlab.tabular.mdp import MDP
 
+Observed = Literal["index", "pixels"]
+Observation = np.int64 | npt.NDArray[np.uint8]
 
-class GridworldEnv(gym.Env[np.int64, np.int64]):
+
+class GridworldEnv(gym.Env[Observation, np.int64]):
     """A drone on a map: the observation is the state's index, the action one of four directions.
+
+    Seen as pixels, the observation is a grey picture `(84, 84)` of the state: what people see,
+    smaller. Either tells the state exactly.
 
     What happens is drawn from `mdp`, so whatever is learned here can be compared with the exact
     answer. An episode ends where the model terminates; it is never truncated from within (see
@@ -24,12 +32,13 @@ class GridworldEnv(gym.Env[np.int64, np.int64]):
         map: the name of a built-in map, a map file, or a map.
         slip: the probability of moving sideways instead, in place of the map's own.
         treasure: what every treasure pays, in place of the map's own value.
+        observation: `index` or `pixels`.
         render_mode: `rgb_array` for pictures, `ansi` for text.
         cell_pixels: the side of a cell in the pictures.
 
     Raises:
         MapError: the map cannot be read or played, or has no treasure to revalue.
-        InputError: an unknown render mode.
+        InputError: an unknown render mode or observation, or a map too large for pixels.
 
     >>> env = GridworldEnv("drone")
     >>> state, info = env.reset(seed=0)
@@ -47,6 +56,7 @@ class GridworldEnv(gym.Env[np.int64, np.int64]):
         *,
         slip: float | None = None,
         treasure: float | None = None,
+        observation: Observed = "index",
         render_mode: str | None = None,
         cell_pixels: int = 64,
     ) -> None:
@@ -58,8 +68,17 @@ class GridworldEnv(gym.Env[np.int64, np.int64]):
                 f"The render mode is '{render_mode}'.",
                 closest(str(render_mode), self.metadata["render_modes"]),
             )
+        if observation not in get_args(Observed):
+            raise InputError(
+                f"The observation is '{observation}'.", closest(observation, get_args(Observed))
+            )
         self.world = Gridworld(grid)
-        self.observation_space = gym.spaces.Discrete(self.mdp.num_states)
+        self._pictures = pictures_of(self.world) if observation == "pixels" else None
+        self.observation_space = (
+            gym.spaces.Discrete(self.mdp.num_states)
+            if self._pictures is None
+            else gym.spaces.Box(0, 255, (SIDE, SIDE), np.uint8)
+        )
         self.action_space = gym.spaces.Discrete(self.mdp.num_actions)
         self.render_mode = render_mode
         self.cell_pixels = cell_pixels
@@ -73,7 +92,7 @@ class GridworldEnv(gym.Env[np.int64, np.int64]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[np.int64, dict[str, Any]]:
+    ) -> tuple[Observation, dict[str, Any]]:
         """Begins an episode at the start, or in `options["state"]`: an index, or `"row,column"`.
 
         Raises:
@@ -89,9 +108,9 @@ class GridworldEnv(gym.Env[np.int64, np.int64]):
                     "Start in a state that is not terminal.",
                 )
         self._state, self._terminated = state, False
-        return np.int64(state), self._info(state)
+        return self._observe(state), self._info(state)
 
-    def step(self, action: np.int64 | int) -> tuple[np.int64, float, bool, bool, dict[str, Any]]:
+    def step(self, action: np.int64 | int) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Takes an action: 0 up, 1 down, 2 left, 3 right.
 
         Raises:
@@ -107,10 +126,10 @@ class GridworldEnv(gym.Env[np.int64, np.int64]):
         if self._terminated:
             raise TrdlabError("The episode is over.", "Call reset() before the next step().")
         drawn = self._draw(state * self.mdp.num_actions + int(action))
-        following = self.mdp.next_states[drawn]
-        self._state, self._terminated = int(following), bool(self.mdp.terminated[drawn])
+        following = int(self.mdp.next_states[drawn])
+        self._state, self._terminated = following, bool(self.mdp.terminated[drawn])
         reward = float(self.mdp.rewards[drawn])
-        return following, reward, self._terminated, False, self._info(self._state)
+        return self._observe(following), reward, self._terminated, False, self._info(following)
 
     def render(self) -> Any:
         """Returns a picture `[H, W, 3]` or a text, as `render_mode` says.
@@ -132,6 +151,9 @@ class GridworldEnv(gym.Env[np.int64, np.int64]):
         from trdlab.gridworld.render import frame  # here: matplotlib is slow to import
 
         return frame(self.world, state, self.cell_pixels)
+
+    def _observe(self, state: int) -> Observation:
+        return np.int64(state) if self._pictures is None else self._pictures[state].copy()
 
     def _draw(self, row: int) -> int:
         """Returns one of the transitions of a row of the model, by their probabilities."""

@@ -1,0 +1,77 @@
+"""Weights from files: safetensors, and PyTorch's own files as long as they hold nothing else."""
+
+import pickle
+import re
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file
+from torch import Tensor
+
+from trdlab.errors import InputError
+
+_HELD_UNDER = ("state_dict", "model_state_dict", "q_network", "network", "model", "weights")
+
+
+def read_weights(path: str | Path) -> dict[str, npt.NDArray[Any]]:
+    """Returns the weights that a file holds, by name; floating-point ones as float32.
+
+    Args:
+        path: a `.safetensors` file, or a state dict as `torch.save` writes it; also a mapping that
+            has a state dict under `state_dict`, `model_state_dict`, `q_network`, `network`,
+            `model` or `weights`.
+
+    Raises:
+        InputError: it cannot be read, or holds anything else. A pickle with code is refused, and
+            the code is not executed.
+    """
+    path = Path(path)
+    try:
+        held = load_file(path) if path.suffix == ".safetensors" else _unpickled(path)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"'{path}' cannot be read: {reason}.", "Name another file.") from error
+    except pickle.UnpicklingError as error:  # its own text advises to execute the file
+        code = re.search(r"GLOBAL ([\w.]+)", str(error))
+        raise InputError(
+            f"'{path}' holds code{f' ({code[1]})' if code else ''}, or is no file of weights.",
+            "Nothing was executed. Give the weights alone: torch.save(network.state_dict(), …).",
+        ) from error
+    except (SafetensorError, RuntimeError, EOFError, LookupError, ValueError) as error:
+        raise InputError(
+            f"'{path}' is torn, or holds no weights.", "Name a .safetensors file or a state dict."
+        ) from error
+    return {name: _array(weight) for name, weight in _state_dict(held, path).items()}
+
+
+def _unpickled(path: Path) -> Any:
+    """Returns what `torch.save` wrote, if it consists of tensors and plain values."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of pickles that torch has not written
+        return torch.load(path, map_location="cpu", weights_only=True)
+
+
+def _state_dict(held: Any, path: Path) -> Mapping[str, Tensor]:
+    """Returns the weights by name, wherever they stand in what a file holds."""
+    inner = [held.get(key) for key in _HELD_UNDER] if isinstance(held, Mapping) else []
+    for found in (held, *inner):
+        if isinstance(found, Mapping) and found and all(map(_is_weight, found.items())):
+            return found
+    raise InputError(
+        f"'{path}' holds no weights by name.", "Give a state dict: names and tensors, no more."
+    )
+
+
+def _is_weight(entry: tuple[Any, Any]) -> bool:
+    return isinstance(entry[0], str) and isinstance(entry[1], Tensor)
+
+
+def _array(tensor: Tensor) -> npt.NDArray[Any]:
+    tensor = tensor.detach().cpu()
+    return np.asarray((tensor.float() if tensor.is_floating_point() else tensor).numpy())

@@ -63,15 +63,17 @@ def _keys() -> dict[str, Any]:
 
 def _option(key: str, default: Any) -> inspect.Parameter:
     of = _keys()[key]
-    kind: Any = type(of.default) if of.default is not None else float
+    kind: Any = of.metadata["kind"]
     names = flag(key)
     if kind is bool:
         names = f"{names}/--no-{names.removeprefix('--')}"
-    elif kind is tuple:
-        kind = list[str] if key == "env_arg" else str
-        default = None if key == "env_arg" else ",".join(map(str, default))
+    elif key == "env_arg":  # given once for each
+        kind, default = list[str], None
+    elif key == "hidden":
+        kind, default = str, ",".join(map(str, default))
     about = typer.Option(
         names,
+        metavar=of.metadata["metavar"],
         help=of.metadata["help"],
         rich_help_panel=of.metadata["panel"],
         show_default=str(default) if default is not None else False,

@@ -49,9 +49,27 @@ class UpdateSettings:
             raise InputError(f"The reduction is {self.reduction!r}.", "Use 'sum' or 'mean'.")
 
 
-def _option(default: Any, about: str, panel: str, key: str | None = None) -> Any:
-    """Returns a field that is an option of the commands, and a line of the configuration."""
-    return field(default=default, metadata={"help": about, "panel": panel, "key": key})
+def _option(
+    default: Any,
+    about: str,
+    panel: str,
+    *,
+    key: str | None = None,
+    kind: type | None = None,
+    metavar: str | None = None,
+) -> Any:
+    """Returns a field that is an option of the commands, and a line of the configuration.
+
+    Args:
+        default: its value where nothing is said.
+        about: the help.
+        panel: under which heading the help stands.
+        key: what it is called outside, if not like the field.
+        kind: the type of its values, or of their elements; by default that of the default.
+        metavar: what the help calls a value, if not by its type.
+    """
+    metadata = {"help": about, "panel": panel, "key": key, "metavar": metavar}
+    return field(default=default, metadata={**metadata, "kind": kind or type(default)})
 
 
 @dataclass(frozen=True)
@@ -74,22 +92,26 @@ class TrainSettings:
 
     kind: Kind
     env: str
-    env_arg: tuple[str, ...] = _option((), "KEY=VALUE to make the environment with.", "Run")
+    env_arg: tuple[str, ...] = _option(
+        (), "To make the environment with.", "Run", kind=str, metavar="KEY=VALUE"
+    )
     seed: int = _option(1, "Of the weights, the environments and every choice.", "Run")
     agent_steps: int = _option(100_000, "Steps to take, of all environments together.", "Run")
     num_envs: int = _option(1, "Environments side by side.", "Run")
     gamma: float = _option(0.99, "Discount factor of a step, in [0, 1).", "Time axis")
-    horizon: int = _option(10, "Number of explicit components; 0 is DQN.", "Time axis", "N")
-    width: int = _option(1, "Steps in each component.", "Time axis", "w")
+    horizon: int = _option(10, "Number of explicit components; 0 is DQN.", "Time axis", key="N")
+    width: int = _option(1, "Steps in each component.", "Time axis", key="w")
     epsilon_start: float = _option(1.0, "Chance of a random action at first.", "Acting")
     epsilon_end: float = _option(0.05, "… and in the end.", "Acting")
     epsilon_steps: int = _option(10_000, "Agent steps from the one to the other.", "Acting")
-    learning_starts: int = _option(1_000, "Agent steps before the first update.", "Learning")
+    learning_starts: int = _option(
+        1_000, "Agent steps, at random, before the first update.", "Learning"
+    )
     update_every: int = _option(4, "Agent steps for each update.", "Learning")
     batch_size: int = _option(32, "Windows in each update.", "Learning")
     learning_rate: float = _option(1e-3, "Adam's, at first.", "Learning")
     learning_rate_end: float | None = _option(
-        None, "… and in the end, falling evenly; without it, the same.", "Learning"
+        None, "… and in the end, falling evenly; without it, the same.", "Learning", kind=float
     )
     target_sync_updates: int = _option(
         250, "Updates (not steps) between copies to the target network.", "Learning"
@@ -99,7 +121,16 @@ class TrainSettings:
     )
     double: bool = _option(False, "Double DQN: the online network chooses.", "Learning")
     bf16: bool = _option(False, "Compute in bfloat16: quicker, less exact.", "Learning")
-    hidden: tuple[int, ...] = _option((128, 128), "Layers of the MLP, for vectors.", "Learning")
+    hidden: tuple[int, ...] = _option(
+        (128, 128), "Layers of the MLP, for vectors.", "Learning", kind=int, metavar="SIZE,SIZE"
+    )
+    weights: str | None = _option(
+        None,
+        "Begin with these weights instead of random ones.",
+        "Learning",
+        kind=str,
+        metavar="FILE",
+    )
     capacity: int = _option(100_000, "Transitions that the replay memory holds.", "Learning")
     clip_rewards: bool = _option(False, "Learn from the sign of each reward.", "Reward and ending")
     life_loss_ends: bool = _option(
@@ -119,6 +150,7 @@ class TrainSettings:
             _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
         for name in ("epsilon_start", "epsilon_end", "evaluate_epsilon"):
             _require(0 <= getattr(self, name) <= 1, name, getattr(self, name), "from 0 to 1")
+        _require(self.seed < 2**63, "seed", self.seed, "less than 2**63")
         end = self.learning_rate_end
         _require(end is None or 0 <= end < float("inf"), "learning_rate_end", end, "0 or more")
         _require(all(size >= 1 for size in self.hidden), "hidden", self.hidden, "sizes above 0")
@@ -195,36 +227,34 @@ def checked(config: Mapping[str, Any], where: str) -> dict[str, Any]:
     Raises:
         InputError: a key is unknown, or a value has another type.
     """
-    names, defaults = _names(), {f.name: f.default for f in fields(TrainSettings)}
+    names, options = _names(), {of.name: of for of in fields(TrainSettings)}
     given = {}
     for key, value in config.items():
         if key not in names:
             raise InputError(f"{where} has an unknown key '{key}'.", closest(key, names))
-        name = names[key]
-        given[name] = _typed(value, defaults[name], key, where)
+        of = options[names[key]]
+        listed = isinstance(of.default, tuple)
+        given[of.name] = _typed(value, of.metadata.get("kind", str), listed, key, where)
     if given.get("kind", "gym") not in get_args(Kind):
         raise InputError(f"{where} has kind = '{given['kind']}'.", "Use 'gym' or 'atari'.")
     return given
 
 
-def _typed(value: Any, default: Any, key: str, where: str) -> Any:
-    """Returns a value of a configuration as the type of the option's default."""
-    if isinstance(default, bool):
-        fits, wanted = isinstance(value, bool), "true or false"
-    elif isinstance(default, tuple):
-        fits, wanted = isinstance(value, list | tuple), "a list"
-        value = tuple(value) if fits else value
-    elif isinstance(default, int):  # also written like 1e6
-        fits = isinstance(value, int | float) and not isinstance(value, bool) and value % 1 == 0
-        value, wanted = int(value) if fits else value, "a whole number"
-    elif isinstance(default, float) or default is None:
-        fits, wanted = isinstance(value, int | float) and not isinstance(value, bool), "a number"
-        value = float(value) if fits else value
-    else:
-        fits, wanted = isinstance(value, str), "a text"
-    if not fits:
+def _typed(value: Any, kind: type, listed: bool, key: str, where: str) -> Any:
+    """Returns a value of a configuration as the type of the option."""
+    values = value if listed and isinstance(value, list | tuple) else [value]
+    if isinstance(value, list | tuple) != listed or not all(_fits(of, kind) for of in values):
+        wanted = f"a list of {_PLURAL[kind]}" if listed else _SINGULAR[kind]
         raise InputError(f"{where} has {key} = {value!r}.", f"It must be {wanted}.")
-    return value
+    return tuple(kind(of) for of in values) if listed else kind(value)
+
+
+def _fits(value: Any, kind: type) -> bool:
+    """Returns whether a value is of a type; whole numbers may be written like 1e6."""
+    if kind in (bool, str):
+        return isinstance(value, kind)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and (kind is float or value % 1 == 0)
 
 
 def _names() -> dict[str, str]:
@@ -237,6 +267,10 @@ _POSITIVE = (
     "checkpoint_every", "log_every",
 )  # fmt: skip
 _NOT_NEGATIVE = ("seed", "epsilon_steps", "evaluate_episodes", "threads")
+
+
+_SINGULAR = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+_PLURAL = {int: "whole numbers", str: "texts"}
 
 
 def _require(holds: bool, name: str, value: object, range_: str) -> None:

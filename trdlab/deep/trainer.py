@@ -4,6 +4,7 @@ It is DQN (Mnih et al., 2015) with a head of A × (N+1) and the law as its targe
 plain DQN. What differs from the paper, and why, stands in the docs under "Errata and deviations".
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,14 +13,14 @@ import torch
 
 from trdlab.arrays import BoolArray, IntArray
 from trdlab.deep.loss import greedy_actions
-from trdlab.deep.memory import memory_needed
 from trdlab.deep.networks import build_network
 from trdlab.deep.replay import ReplayBuffer
 from trdlab.deep.scores import Scores
 from trdlab.deep.settings import TrainSettings
-from trdlab.deep.update import Learner
+from trdlab.deep.update import Learner, load_weights
 from trdlab.environments import Environments, NotReproducible, Step
 from trdlab.environments.stack import FrameStack, observation_space
+from trdlab.errors import TrdlabError
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,8 @@ class Trainer:
         self.learner = Learner(network, settings.update_settings, settings.device)
         self.memory = ReplayBuffer(
             settings.capacity,
-            **_frames_of(environments),
+            environments.observation_space.shape or (),
+            np.dtype(environments.observation_space.dtype),
             width=settings.width,
             gamma=settings.gamma,
             num_envs=environments.num_envs,
@@ -91,10 +93,25 @@ class Trainer:
         """Whether all steps have been taken."""
         return self.agent_steps >= self.settings.agent_steps
 
+    def begin_with(self, weights: Mapping[str, Any]) -> None:
+        """Gives the network weights, arrays by name, before anything is learned.
+
+        Raises:
+            InputError: they are those of another network.
+        """
+        load_weights(self.learner.q_network, weights)
+        self.learner.sync_target()
+
     def step(self) -> None:
-        """Acts once in every environment, remembers it, and makes the updates that are due."""
+        """Acts once in every environment, remembers it, and makes the updates that are due.
+
+        Raises:
+            TrdlabError: a reward, an observation or the loss is not finite. Nothing was remembered
+                or learned of it, but the trainer cannot go on.
+        """
         frames, actions = self.stack.newest.copy(), self._choose()
         step = self.environments.step(actions)
+        _check_finite(step, self.agent_steps)
         self._remember(frames, actions, step)
         self.scores.add(step)
         self.stack.push(step.following, step.ended)
@@ -203,20 +220,17 @@ class Trainer:
         self.stack.frames[...] = state["stack"]
         return None
 
-    def memory_needed(self, capacity: int) -> int:
-        """Returns the bytes that a full replay memory of this capacity would take here."""
-        return memory_needed(
-            capacity,
-            **_frames_of(self.environments),
-            num_envs=self.environments.num_envs,
-            frame_nbytes=self.memory.bytes_per_frame if len(self.memory) else None,
-        )
 
-
-def _frames_of(environments: Environments) -> dict[str, Any]:
-    """Returns shape and type of a frame, as the replay memory takes them."""
-    space = environments.observation_space
-    return {"shape": space.shape or (), "dtype": space.dtype}
+def _check_finite(step: Step, agent_steps: int) -> None:
+    """Refuses what would spoil the network now, or later out of the memory."""
+    for name, values in (("reward", step.rewards), ("observation", step.frames)):
+        finite = np.isfinite(values)
+        if not finite.all():
+            raise TrdlabError(
+                f"The environment gave the {name} {values[~finite][0]} after {agent_steps} agent "
+                "steps. Nothing was learned from it.",
+                "Correct the environment; earlier checkpoints hold nothing of it.",
+            )
 
 
 def _all(num_envs: int) -> BoolArray:

@@ -4,12 +4,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
+from hashlib import file_digest
 from pathlib import Path
 from typing import Any
 
 from trdlab.deep.memory import check_memory
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
+from trdlab.deep.weights import read_weights
 from trdlab.errors import InputError, TrdlabError
 from trdlab.runs import (
     MetricsFile,
@@ -18,7 +20,14 @@ from trdlab.runs import (
     load_checkpoint,
     save_checkpoint,
 )
-from trdlab.training.setup import describe, make_environments, new_trainer, resolved
+from trdlab.runs.folder import check_free
+from trdlab.training.setup import (
+    describe,
+    make_environments,
+    memory_of,
+    new_trainer,
+    resolved,
+)
 
 
 @dataclass(eq=False)
@@ -29,6 +38,7 @@ class Run:
         folder: where it is kept.
         trainer: what learns.
         metrics: where its numbers go.
+        memory: the bytes that the replay memory takes when it is full.
         seconds: how long it has been trained, this process and those before.
         problem: what could not be restored when it was picked up, or None.
     """
@@ -36,6 +46,7 @@ class Run:
     folder: RunFolder
     trainer: Trainer
     metrics: MetricsFile
+    memory: int
     seconds: float = 0.0
     problem: TrdlabError | None = None
 
@@ -78,12 +89,12 @@ def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
         TrdlabError: the replay memory does not fit into what is free.
     """
     with ExitStack() as stack:
-        trainer = _trainer(settings, stack)
-        check_memory(trainer.memory_needed(settings.capacity), settings.capacity)
-        extra = {"environment": describe(trainer.environments)}
+        check_free(path)
+        trainer, memory = _trainer(settings, stack)
+        extra = {"environment": describe(trainer.environments), **_given_weights(trainer)}
         folder = RunFolder.create(path, trainer.settings.to_config(), extra)
         stack.enter_context(folder.held())
-        yield Run(folder, trainer, stack.enter_context(MetricsFile(folder.metrics, 0)))
+        yield Run(folder, trainer, stack.enter_context(MetricsFile(folder.metrics, 0)), memory)
 
 
 @contextmanager
@@ -102,14 +113,15 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
     settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
     with ExitStack() as stack:
         stack.enter_context(folder.held())
-        trainer = _trainer(settings, stack)
-        check_memory(trainer.memory_needed(settings.capacity), settings.capacity)
+        trainer, memory = _trainer(settings, stack)
         begun = bool(checkpoint_steps(folder)) or step is not None
-        run = Run(folder, trainer, MetricsFile(folder.metrics, None if begun else 0))
+        run = Run(folder, trainer, MetricsFile(folder.metrics, None if begun else 0), memory)
         stack.callback(lambda: run.metrics.close())
         if begun:
             run.metrics.close()
             run.restore(step)
+        else:
+            _check_same_weights(folder, _given_weights(trainer))
         yield run
 
 
@@ -155,10 +167,33 @@ def carry_on(
     return trainer.done
 
 
-def _trainer(settings: TrainSettings, stack: ExitStack) -> Trainer:
+def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
+    """Returns a trainer at its beginning, and the bytes that its replay memory will take."""
     environments = make_environments(settings)
     stack.callback(environments.close)
-    return new_trainer(resolved(settings, environments), environments)
+    memory = memory_of(settings, environments)
+    check_memory(memory, settings.capacity)
+    return new_trainer(resolved(settings, environments), environments), memory
+
+
+def _given_weights(trainer: Trainer) -> dict[str, Any]:
+    """Gives a trainer the weights that its settings name; returns what to note of them."""
+    file = trainer.settings.weights
+    if file is None:
+        return {}
+    trainer.begin_with(read_weights(file))
+    with Path(file).open("rb") as content:
+        return {"weights": {"file": file, "sha256": file_digest(content, "sha256").hexdigest()}}
+
+
+def _check_same_weights(folder: RunFolder, given: dict[str, Any]) -> None:
+    begun_with = folder.manifest.get("weights")
+    if given.get("weights") != begun_with:
+        file = (begun_with or given["weights"])["file"]
+        raise InputError(
+            f"The run '{folder.path}' began with other weights than those in '{file}' now.",
+            "Put them back, or begin another run.",
+        )
 
 
 def _passes(before: int, after: int, every: int) -> bool:

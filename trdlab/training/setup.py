@@ -81,14 +81,37 @@ def make_environments(
 
 
 def resolved(settings: TrainSettings, environments: Environments) -> TrainSettings:
-    """Returns the settings with what `auto` and 0 stand for on this machine.
+    """Returns the settings with what `auto`, 0 and a relative path stand for here.
 
     Raises:
         InputError: PyTorch does not find the device.
     """
-    images = environments.stack is not None
+    images = len(environments.observation_space.shape or ()) >= 2
     threads = settings.threads or (os.cpu_count() or 1 if images else 1)
-    return replace(settings, device=_device(settings.device), threads=threads)
+    weights = str(Path(settings.weights).resolve()) if settings.weights else None
+    return replace(settings, device=_device(settings.device), threads=threads, weights=weights)
+
+
+def memory_of(
+    settings: TrainSettings, environments: Environments, frame_nbytes: float | None = None
+) -> int:
+    """Returns the bytes that the full replay memory of a run takes.
+
+    Args:
+        settings: with its capacity.
+        environments: what it remembers.
+        frame_nbytes: what a frame takes in it, if that has been measured.
+    """
+    from trdlab.deep.memory import memory_needed
+
+    space = environments.observation_space
+    return memory_needed(
+        settings.capacity,
+        space.shape or (),
+        np.dtype(space.dtype),
+        num_envs=environments.num_envs,
+        frame_nbytes=frame_nbytes,
+    )
 
 
 def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer":
@@ -158,15 +181,24 @@ class Plan:
 
 
 def plan(settings: TrainSettings) -> Plan:
-    """Makes a run in miniature, learns for a few seconds, and says what the whole one will take."""
-    from trdlab.deep.memory import available_memory
+    """Makes a run in miniature, learns for a few seconds, and says what the whole one will take.
+
+    Raises:
+        InputError: the environments cannot be made, or have no network.
+        TrdlabError: the replay memory does not fit into what is free.
+    """
+    from trdlab.deep.memory import available_memory, check_memory
+    from trdlab.deep.weights import read_weights
 
     environments = make_environments(settings)
     try:
         settings = resolved(settings, environments)
+        check_memory(memory_of(settings, environments), settings.capacity)
         warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
         begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)
         trainer = new_trainer(begun, environments)
+        if settings.weights:
+            trainer.begin_with(read_weights(settings.weights))
         acting = _steps_per_second(trainer, until=warm_up, at_most=_MEASURED_SECONDS)
         while trainer.learner.num_updates < 2:  # what PyTorch does once
             trainer.step()
@@ -175,7 +207,7 @@ def plan(settings: TrainSettings) -> Plan:
         learning = _steps_per_second(trainer, until=None, at_most=_MEASURED_SECONDS)
         first = min(settings.learning_starts, settings.agent_steps)
         seconds = first / acting + (settings.agent_steps - first) / learning
-        memory = trainer.memory_needed(settings.capacity)
+        memory = memory_of(settings, environments, trainer.memory.bytes_per_frame)
         return Plan(settings, memory, available_memory(), seconds, learning)
     finally:
         environments.close()

@@ -59,7 +59,7 @@ class TrainingProgress:
     def __init__(self, console: Console, total: int, done: int = 0) -> None:
         self._console, self._total = console, total
         self._first, self._begun = done, time.monotonic()
-        self._shown, self._state = 0.0, "score –  loss –"
+        self._shown, self._state = 0.0, "score –, loss –"
         self._bar: Progress | None = None
         if console.is_terminal:
             columns: tuple[Any, ...] = (
@@ -86,7 +86,7 @@ class TrainingProgress:
         """Takes note of score and loss."""
         score = "–" if metrics.score is None else f"{metrics.score:.4g}"
         loss = "–" if metrics.loss is None else f"{metrics.loss:.3g}"
-        self._state = f"score {score}  loss {loss}"
+        self._state = f"score {score}, loss {loss}"
 
     def on_step(self, trainer: "Trainer") -> None:
         """Shows where the run stands, if it is time to."""
@@ -95,15 +95,15 @@ class TrainingProgress:
             return
         self._shown = now
         done = trainer.agent_steps
-        steps = f"{done:,} of {self._total:,} steps  {self._speed(done, now)}"
+        steps = f"{done:,} of {self._total:,} steps{self._speed(done, now)}"
         if self._bar is not None:
             self._bar.update(self._task, completed=done, steps=steps, state=self._state)
         else:
-            self._console.print(f"{steps}  {self._state}", soft_wrap=True, markup=False)
+            self._console.print(f"{steps}, {self._state}", soft_wrap=True, markup=False)
 
     def _speed(self, done: int, now: float) -> str:
         passed = now - self._begun
-        return f"{(done - self._first) / passed:,.0f}/s" if passed > 1.0 else ""
+        return f", {(done - self._first) / passed:,.0f}/s" if passed > 1.0 else ""
 
 
 class EpisodeProgress:

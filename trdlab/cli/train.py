@@ -10,6 +10,7 @@ from rich.console import Console
 
 from trdlab.cli import common
 from trdlab.cli.options import with_settings
+from trdlab.deep.presets import DEFAULT_PRESETS, PRESETS
 
 if TYPE_CHECKING:
     from trdlab.deep.settings import Kind
@@ -17,7 +18,18 @@ if TYPE_CHECKING:
 
 train = typer.Typer(help="Train a network that decomposes.", no_args_is_help=True)
 
-Preset = Annotated[str | None, typer.Option("--preset", help="Named settings to begin from.")]
+
+def _presets(kind: "Kind") -> Any:
+    """Returns the option that names where settings begin, with a help that lists them."""
+    known = "; ".join(f"{name}: {about}" for name, (about, _) in PRESETS[kind].items())
+    shown = DEFAULT_PRESETS[kind]
+    return typer.Option(
+        "--preset", metavar="NAME", help=f"Settings to begin from. {known}.", show_default=shown
+    )
+
+
+GymPreset = Annotated[str | None, _presets("gym")]
+AtariPreset = Annotated[str | None, _presets("atari")]
 ConfigFile = Annotated[
     Path | None, typer.Option("--config", metavar="FILE", help="Settings in a .toml file.")
 ]
@@ -48,7 +60,7 @@ def train_gym(
             "trdlab/DroneGridworld-v0; or MODULE:ENV_ID, to import a module first.",
         ),
     ],
-    preset: Preset = None,
+    preset: GymPreset = None,
     config: ConfigFile = None,
     out: Out = None,
     dry_run: DryRun = False,
@@ -66,7 +78,7 @@ def train_gym(
 @with_settings("atari")
 def train_atari(
     game: Annotated[str, typer.Argument(metavar="GAME", help="An Atari game, such as Breakout.")],
-    preset: Preset = None,
+    preset: AtariPreset = None,
     config: ConfigFile = None,
     out: Out = None,
     dry_run: DryRun = False,
@@ -179,13 +191,15 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
     from shlex import quote
 
     from trdlab.cli.progress import TrainingProgress, stopping
-    from trdlab.show.training import duration
+    from trdlab.deep.memory import available_memory
+    from trdlab.show.training import duration, memory_line
     from trdlab.training.run import carry_on
 
     errors = _errors()
     with stopping() as stop, open_run() as run:
         path, settings = run.folder.path, run.trainer.settings
         _say(errors, f"Run: {path}")
+        _say(errors, memory_line(run.memory, available_memory()))
         if run.problem is not None:
             _say(errors, f"{run.problem.cause} New episodes are begun in their place.")
         with TrainingProgress(errors, settings.agent_steps, run.trainer.agent_steps) as progress:

@@ -15,10 +15,9 @@ from trdlab.training.setup import Plan
 
 def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
     """Returns the resolved configuration, and the memory and time that it will take."""
-    free = "" if plan.available is None else f" of {_gigabytes(plan.available)} that are free"
     lines = [
         to_toml(plan.settings.to_config()),
-        f"Replay memory: {_gigabytes(plan.memory)}{free}.",
+        memory_line(plan.memory, plan.available),
         f"Time: about {duration(plan.seconds)}, at {plan.steps_per_second:,.0f} agent steps a "
         f"second while learning (measured here, in a few seconds).",
         "Nothing was written: leave out --dry-run to train.",
@@ -84,6 +83,16 @@ def status(run: RunSummary) -> str:
     return f"stopped at {run.step:,} of {total:,}"
 
 
+def memory_line(needed: int, available: int | None) -> str:
+    """Returns what a replay memory takes.
+
+    >>> memory_line(2_100_000_000, 24_000_000_000)
+    'Replay memory: up to 2.10 GB, of 24.00 GB that are free.'
+    """
+    free = "" if available is None else f", of {_gigabytes(available)} that are free"
+    return f"Replay memory: up to {_gigabytes(needed)}{free}."
+
+
 def duration(seconds: float) -> str:
     """Returns a time as people say it.
 
@@ -93,7 +102,7 @@ def duration(seconds: float) -> str:
     for unit, name in ((86_400, "days"), (3_600, "hours"), (60, "minutes")):
         if seconds >= 1.5 * unit:
             return f"{seconds / unit:.2g} {name}"
-    return f"{max(1, round(seconds))} seconds"
+    return "1 second" if seconds < 1.5 else f"{round(seconds)} seconds"
 
 
 def _gigabytes(nbytes: float) -> str:

@@ -7,20 +7,22 @@ if TYPE_CHECKING:
     from trdlab.decomposition import RewardDecomposition
     from trdlab.estimator import Estimator, Future
     from trdlab.time_axis import TimeAxis
+    from trdlab.training.loading import load
 
 __version__ = "0.1.0"
-__all__ = ["Estimator", "Future", "RewardDecomposition", "TimeAxis", "__version__"]
+__all__ = ["Estimator", "Future", "RewardDecomposition", "TimeAxis", "__version__", "load"]
 
 _HOMES = {
     "RewardDecomposition": "trdlab.decomposition",
     "TimeAxis": "trdlab.time_axis",
     "Estimator": "trdlab.estimator",
     "Future": "trdlab.estimator",
+    "load": "trdlab.training.loading",
 }
 
 
 def __getattr__(name: str) -> object:
-    """Imports the nouns when they are first asked for, so that `import trdlab` costs nothing."""
+    """Imports what is here when it is first asked for, so that `import trdlab` costs nothing."""
     if name not in _HOMES:
         raise AttributeError(f"module 'trdlab' has no attribute '{name}'")
     from importlib import import_module

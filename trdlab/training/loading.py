@@ -20,6 +20,9 @@ EVALUATION_SEED = 1000
 def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
     """Loads the agent of a run as an Estimator; its environment is not needed.
 
+    `trdlab.load("runs/…").decompose(observations)` is the shortest way from a trained network to
+    the components of every action.
+
     Args:
         path: the run's folder.
         step: of an older checkpoint, in agent steps; by default the newest.

@@ -202,7 +202,7 @@ def _is_image(space: gym.Space[Any]) -> bool:
 def _checked_actions(env: gym.Env[Any, Any], name: str) -> gym.spaces.Discrete:
     if str(env.spec.entry_point if env.spec else "").startswith("ale_py"):
         raise InputError(
-            f"{name} is an Atari game.", "Its frames need preparing: use trdlab train atari."
+            f"{name} is an Atari game.", f"Use: trdlab train atari {name.rpartition(':')[2]}"
         )
     if not isinstance(env.action_space, gym.spaces.Discrete):
         raise InputError(

@@ -178,14 +178,14 @@ class TrainSettings:
         if agent_steps < self.learning_starts:
             return 1.0
         part = min(1.0, agent_steps / max(1, self.epsilon_steps))
-        return self.epsilon_start + part * (self.epsilon_end - self.epsilon_start)
+        return (1.0 - part) * self.epsilon_start + part * self.epsilon_end
 
     def learning_rate_at(self, agent_steps: int) -> float:
         """Returns Adam's learning rate after so many agent steps."""
         if self.learning_rate_end is None:
             return self.learning_rate
         part = min(1.0, agent_steps / self.agent_steps)
-        return self.learning_rate + part * (self.learning_rate_end - self.learning_rate)
+        return (1.0 - part) * self.learning_rate + part * self.learning_rate_end
 
     def updates_due(self, agent_steps: int) -> int:
         """Returns the updates that should have been made after so many agent steps."""

@@ -54,7 +54,7 @@ class Trainer:
     """An agent that learns to decompose while it acts.
 
     Args:
-        settings: what to do.
+        settings: what to do; its device is a real one, not `auto`.
         environments: where; made with `settings.seed`. They are reset at once.
 
     Raises:

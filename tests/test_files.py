@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from trdlab.errors import OutputError
-from trdlab.files import check_output, write_whole
+from trdlab.errors import OutputError, TrdlabError
+from trdlab.files import check_output, is_leftover, read_json, write_json, write_whole
 
 SUFFIXES = (".png", ".svg")
 
@@ -120,3 +120,78 @@ def test_the_longest_name_can_be_written(tmp_path):
     path = tmp_path / ("a" * 251 + ".png")  # 255, the limit of most file systems
     write_whole(path, lambda temporary: temporary.write_text("x"))
     assert list(tmp_path.iterdir()) == [path]
+
+
+def a_folder(text: str):
+    """Returns what writes a folder with a folder in it."""
+
+    def write(folder: Path) -> None:
+        (folder / "inner").mkdir(parents=True)
+        (folder / "inner" / "file").write_text(text)
+
+    return write
+
+
+def test_a_folder_appears_when_it_is_whole(tmp_path):
+    path = tmp_path / "folder"
+    path.mkdir()  # an empty one may be there
+    write_whole(path, a_folder("x"))
+    assert (path / "inner" / "file").read_text() == "x"
+    with pytest.raises(OutputError, match=r"folder': Directory not empty\."):
+        write_whole(path, a_folder("y"))
+    assert (path / "inner" / "file").read_text() == "x"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_that_fails_leaves_nothing_behind(tmp_path):
+    def write(folder: Path) -> None:
+        a_folder("x")(folder)
+        full_disk(folder / "file")
+
+    with pytest.raises(OutputError, match="No space left on device"):
+        write_whole(tmp_path / "folder", write)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_a_killed_process_left_is_recognised_and_no_obstacle(tmp_path):
+    seen = []
+
+    def killed(folder: Path) -> None:
+        a_folder("old")(folder)
+        seen.append(folder)
+        folder.rename(tmp_path / "kept")  # out of reach of any clearing up
+
+    with pytest.raises(OutputError):
+        write_whole(tmp_path / "folder", killed)
+    (tmp_path / "kept").rename(seen[0])
+    assert is_leftover(seen[0])
+    write_whole(tmp_path / "folder", a_folder("new"))
+    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
+
+
+def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+    path, synced = tmp_path / "folder", []
+
+    def fsync(number: int) -> None:
+        synced.append((Path(f"/proc/self/fd/{number}").readlink().name, path.exists()))
+
+    if not Path("/proc/self/fd").exists():
+        pytest.skip("this system does not tell which file is synced")
+    monkeypatch.setattr(os, "fsync", fsync)
+    write_whole(path, a_folder("x"))
+    *inside, parent = synced
+    assert [name for name, _ in inside][:2] == ["file", "inner"]
+    assert not any(visible for _, visible in inside)
+    assert parent == (tmp_path.name, True)
+
+
+def test_json_files(tmp_path):
+    path = tmp_path / "a.json"
+    write_json(path, {"a": [1, "é"]})
+    assert read_json(path) == {"a": [1, "é"]}
+    for torn in ('{"a": [1', "", "\x00", "[" * 100_000):
+        path.write_text(torn)
+        with pytest.raises(TrdlabError, match=r"a\.json' is torn: "):
+            read_json(path)
+    with pytest.raises(TrdlabError, match=r"b\.json' cannot be read: No such file or directory\."):
+        read_json(tmp_path / "b.json")

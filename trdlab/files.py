@@ -1,5 +1,6 @@
 """Writing results: never over an old one by accident, never half a file."""
 
+import errno
 import json
 import os
 from collections.abc import Callable, Collection
@@ -127,5 +128,8 @@ def _sync_entry(folder: Path) -> None:
     number = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(number)
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # some file systems cannot be asked that of a folder
+            raise
     finally:
         os.close(number)

@@ -1,6 +1,10 @@
 """A checkpoint is whole or not there, and what comes back is what was saved."""
 
+import errno
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from trdlab.errors import InputError, TrdlabError
+from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_arrays, save_checkpoint
 from trdlab.runs.state import DTYPES, pack, unpack
 
@@ -64,7 +68,7 @@ NESTED = st.recursive(
 STATES = st.dictionaries(st.from_regex(r"[a-z][a-z0-9_]{0,9}", fullmatch=True), NESTED, max_size=4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(STATES)
 def test_any_state_comes_back_to_the_bit(tmp_path_factory, state):
     run = RunFolder.create(tmp_path_factory.mktemp("runs") / "run", {})
@@ -222,3 +226,97 @@ def test_a_doctored_index_leads_nowhere(run, tmp_path):
         index.write_text(doctored)
         with pytest.raises(TrdlabError, match=r"index\.json' is torn"):
             load_checkpoint(run)
+
+
+# ---- what cannot be written --------------------------------------------------------------------
+
+
+def test_whatever_write_fails_the_checkpoint_before_is_whole(run, monkeypatch):
+    save_checkpoint(run, 1, a_state(1), some_blocks(1))
+    before = files(run.replay), files(run.checkpoints)
+    write_bytes, left = Path.write_bytes, 0
+
+    def failing(path: Path, data: bytes) -> int:
+        nonlocal left
+        left -= 1
+        if left >= 0:
+            return write_bytes(path, data)
+        write_bytes(path, data[: len(data) // 2])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_bytes", failing)
+    for allowed in range(6):  # two blocks, the state, the weights, the memory, the index
+        left = allowed
+        with pytest.raises(OutputError) as caught:
+            save_checkpoint(run, 2, a_state(2), some_blocks(1, 2, 3))
+        assert "step 2 cannot be saved: Cannot write '" in str(caught.value)
+        assert "No space left on device." in str(caught.value)
+        assert str(caught.value).endswith(f"trdlab resume {run.path} goes on from step 1.")
+        assert (files(run.replay), files(run.checkpoints)) == before
+        assert same(load_checkpoint(run).state, a_state(1))
+    left = 6
+    save_checkpoint(run, 2, a_state(2), some_blocks(1, 2, 3))
+    assert load_checkpoint(run).blocks == some_blocks(1, 2, 3)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A real disk of one megabyte."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)]
+    try:
+        subprocess.run(command, check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("a disk can be mounted only by root, and not everywhere")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_disk_that_fills_up(small_disk):
+    run = RunFolder.create(small_disk / "run", {})
+    save_checkpoint(run, 1, a_state(1), {"a": bytes(300_000)})
+    taken = sorted(run.path.rglob("*"))
+    for state, blocks in (
+        (a_state(2), {"a": bytes(300_000), "b": bytes(400_000), "c": bytes(400_000)}),
+        ({"big": np.zeros(100_000)}, {}),
+    ):
+        with pytest.raises(
+            OutputError, match=r"step 2 cannot be saved: .* No space left on device"
+        ):
+            save_checkpoint(run, 2, state, blocks)
+        assert sorted(run.path.rglob("*")) == taken
+        assert same(load_checkpoint(run).state, a_state(1))
+    save_checkpoint(run, 2, a_state(2), {"a": bytes(300_000), "b": bytes(400_000)})
+    assert checkpoint_steps(run) == [1, 2]
+
+
+def test_a_first_checkpoint_that_fails(run):
+    run.checkpoints.rmdir()
+    run.checkpoints.touch()
+    with pytest.raises(OutputError, match=r"File exists\. When .* goes on from the beginning\."):
+        save_checkpoint(run, 1, a_state(1))
+
+
+def test_old_checkpoints_that_cannot_be_deleted_are_no_failure_to_save(run, monkeypatch):
+    def failing(*_: object) -> None:
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES))
+
+    for step in (1, 2):
+        save_checkpoint(run, step, a_state(step))
+    monkeypatch.setattr("trdlab.files.rmtree", failing)
+    with pytest.raises(OutputError, match=r"step 3 is saved, but an old one .*: Permission denied"):
+        save_checkpoint(run, 3, a_state(3))
+    assert same(load_checkpoint(run).state, a_state(3))
+
+
+# ---- what is killed ----------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
+@pytest.mark.parametrize("when", ["next", "again", "random"])
+def test_kill_9_at_any_moment_leaves_the_newest_checkpoint_whole(tmp_path, when):
+    command = [sys.executable, Path(__file__).with_name("crash.py"), when, tmp_path / "run"]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert int(ended.stdout) >= 30  # kills

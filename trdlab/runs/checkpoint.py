@@ -1,9 +1,9 @@
 """Checkpoints: each whole or not there, and every byte checked when it is read.
 
 A checkpoint is a folder `checkpoints/STEP` with `state.json`, one safetensors file for each
-top-level key of the state that holds arrays, and `index.json`, which lists the files and the blocks
-with their lengths and checksums. A block is a file in `replay/` whose name holds its checksum:
-it never changes, and checkpoints share it.
+top-level key of the state that holds arrays, and `index.json`, which lists these files, and the
+blocks that belong to it, with lengths and checksums. A block is a file in `replay/` that never
+changes, so that checkpoints can share it.
 """
 
 import json
@@ -14,23 +14,19 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
-from zlib import crc32
+from typing import Any, NamedTuple
 
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from trdlab.errors import InputError, OutputError, TrdlabError, closest
-from trdlab.files import is_leftover, read_json, remove, write_whole
+from trdlab.files import is_leftover, remove, write_whole
 from trdlab.runs.folder import RunFolder
+from trdlab.runs.index import Index, Sum, check_names, read_whole
 from trdlab.runs.state import Arrays, pack, unpack
 
-STATE, INDEX, TENSORS = "state.json", "index.json", ".safetensors"
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+STATE, TENSORS = "state.json", ".safetensors"
 FOLDER = re.compile(r"(\d+)(?:\.(\d+))?")  # a step, and which try where there were several
-
-Sums = dict[str, tuple[int, int]]
-"""Length and CRC-32 by name."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +44,14 @@ class Checkpoint:
     blocks: dict[str, bytes]
 
 
+class _Saved(NamedTuple):
+    """A checkpoint on disk; the later of two sorts last."""
+
+    step: int
+    attempt: int
+    folder: Path
+
+
 def save_checkpoint(
     run: RunFolder,
     step: int,
@@ -58,14 +62,15 @@ def save_checkpoint(
 ) -> None:
     """Saves a checkpoint, and then deletes old ones and the blocks that none needs any more.
 
-    Checkpoints of this step or later are replaced: the run went back, and they are of a past that
-    did not happen. Only the process that holds the run may save.
+    Checkpoints at this step or later are deleted then, too: the run went back, and they are of a
+    past that did not happen. Only the process that holds the run may save.
 
     Args:
         run: the run.
         step: when, in agent steps.
         state: nested mappings and lists of JSON values, numpy arrays and bytes.
-        blocks: bytes, or what can be read like them, by name; only those not saved yet are written.
+        blocks: bytes, or what can be read like them, by name. Those that the checkpoint before has,
+            with the same contents, are not written again.
         keep: how many checkpoints to keep, this one included.
 
     Raises:
@@ -74,31 +79,20 @@ def save_checkpoint(
     """
     tree, arrays = pack(state)
     blocks = blocks or {}
-    for name in (*arrays, *blocks):
-        if not NAME.fullmatch(name):
-            raise InputError(f"'{name}' cannot name a file.", "Use letters, digits, '_', '.', '-'.")
-    sums = {name: _sum(block) for name, block in blocks.items()}
-    folder = _new_folder(run, step)
+    check_names((*arrays, *blocks))
+    index = Index({}, {name: Sum.of(block) for name, block in blocks.items()})
     try:
         _sweep(run)  # makes room before room is needed
-        saved = _saved_blocks(run, step)
-        for name, block in blocks.items():
-            path = run.replay / _block_name(name, sums[name])
-            if path not in saved:
-                write_whole(path, partial(Path.write_bytes, data=block))
-        write_whole(folder, lambda temporary: _write(temporary, tree, arrays, sums))
+        folder, there = _new_folder(run, step), _blocks_before(run, step)
+        for name, file in index.block_files.items():
+            if file not in there:
+                write_whole(run.replay / file, partial(Path.write_bytes, data=blocks[name]))
+        write_whole(folder, lambda temporary: _write(temporary, tree, arrays, index.blocks))
     except (OutputError, OSError) as error:
         with suppress(OSError):  # the first failure is the one to tell
             _sweep(run)
         raise _not_saved(run, step, error) from error
-    try:
-        _forget(run, folder, step, keep)
-    except OSError as error:
-        raise OutputError(
-            f"The checkpoint at step {step} is saved, but an old one cannot be deleted: "
-            f"{error.strerror or error}.",
-            f"See '{run.path}'.",
-        ) from error
+    _forget(run, step, folder, keep)
 
 
 def load_checkpoint(run: RunFolder, step: int | None = None) -> Checkpoint:
@@ -108,11 +102,11 @@ def load_checkpoint(run: RunFolder, step: int | None = None) -> Checkpoint:
         InputError: there is none, or none at that step.
         TrdlabError: it is torn. Another one that is whole is named, and not taken silently.
     """
-    step = _chosen(run, step)
+    saved = _chosen(run, step)
     try:
-        return _load(run, step)
+        return _load(run, saved)
     except TrdlabError as error:
-        raise _torn(run, step, error) from error
+        raise _torn(run, saved, error) from error
 
 
 def read_arrays(run: RunFolder, key: str, step: int | None = None) -> Arrays:
@@ -121,86 +115,113 @@ def read_arrays(run: RunFolder, key: str, step: int | None = None) -> Arrays:
     Args:
         run: the run.
         key: such as `q_network`.
-        step: of the checkpoint, the newest one if not given.
+        step: of the checkpoint; by default the newest.
 
     Raises:
         InputError: there is no such checkpoint, or it has no arrays under that key.
         TrdlabError: it is torn. Another one that is whole is named, and not taken silently.
     """
-    step = _chosen(run, step)
-    folder = _folders(run)[step]
+    saved, name = _chosen(run, step), f"{key}{TENSORS}"
     try:
-        files, _ = _index(folder)
-        name = f"{key}{TENSORS}"
-        arrays = _arrays(folder / name, files[name]) if name in files else None
+        files = Index.read(saved.folder).files
+        arrays = _arrays(saved.folder / name, files[name]) if name in files else None
     except TrdlabError as error:
-        raise _torn(run, step, error) from error
+        raise _torn(run, saved, error) from error
     if arrays is None:
         keys = [name.removesuffix(TENSORS) for name in files if name != STATE]
-        raise InputError(f"The checkpoint at step {step} has no '{key}'.", closest(key, keys))
+        raise InputError(f"The checkpoint at step {saved.step} has no '{key}'.", closest(key, keys))
     return arrays
 
 
 def checkpoint_steps(run: RunFolder) -> list[int]:
     """Returns the steps at which there is a checkpoint, the newest last."""
-    return list(_folders(run))
+    return sorted({saved.step for saved in _all(run)})
 
 
-def _write(temporary: Path, tree: dict[str, Any], arrays: dict[str, Arrays], sums: Sums) -> None:
+def _write(
+    folder: Path, tree: dict[str, Any], arrays: dict[str, Arrays], blocks: Mapping[str, Sum]
+) -> None:
     """Writes all files of a checkpoint."""
-    temporary.mkdir()
-    files = {STATE: _written(temporary / STATE, json.dumps(tree, allow_nan=False).encode())}
+    folder.mkdir()
+    sums = {}
+
+    def write(name: str, data: bytes) -> None:
+        (folder / name).write_bytes(data)
+        sums[name] = Sum.of(data)
+
+    write(STATE, json.dumps(tree, allow_nan=False).encode())
     for key, held in arrays.items():
-        name = f"{key}{TENSORS}"
-        files[name] = _written(temporary / name, save(held))
-    _written(temporary / INDEX, json.dumps({"files": files, "blocks": sums}).encode())
+        write(f"{key}{TENSORS}", save(held))
+    Index(sums, blocks).write(folder)
 
 
-def _load(run: RunFolder, step: int) -> Checkpoint:
-    folder = _folders(run)[step]
-    files, blocks = _index(folder)
+def _load(run: RunFolder, saved: _Saved) -> Checkpoint:
+    index, folder = Index.read(saved.folder), saved.folder
+    files = dict(index.files)
     try:
-        tree = json.loads(_read(folder / STATE, files.pop(STATE)))
+        tree = json.loads(read_whole(folder / STATE, files.pop(STATE)))
     except (KeyError, ValueError, RecursionError) as error:  # it was doctored: its sum is right
         raise TrdlabError(f"'{folder / STATE}' is not valid: {error}.") from error
-    arrays = {name.removesuffix(TENSORS): _arrays(folder / name, files[name]) for name in files}
-    return Checkpoint(
-        step,
-        unpack(tree, arrays),
-        {name: _read(run.replay / _block_name(name, sum_), sum_) for name, sum_ in blocks.items()},
-    )
+    arrays = {
+        name.removesuffix(TENSORS): _arrays(folder / name, sum_) for name, sum_ in files.items()
+    }
+    state = unpack(tree, arrays)
+    blocks = {
+        name: read_whole(run.replay / file, index.blocks[name])
+        for name, file in index.block_files.items()
+    }
+    return Checkpoint(saved.step, state, blocks)
 
 
-def _is_whole(run: RunFolder, step: int) -> bool:
+def _arrays(path: Path, expected: Sum) -> Arrays:
+    data = read_whole(path, expected)
     try:
-        _load(run, step)
-    except TrdlabError:
-        return False
-    return True
+        return dict(sorted(load(data).items()))  # it has no order of its own
+    except (SafetensorError, KeyError) as error:  # it was doctored: its sum is right
+        raise TrdlabError(f"'{path}' is no valid safetensors file: {error}.") from error
 
 
-def _forget(run: RunFolder, newest: Path, step: int, keep: int) -> None:
-    """Deletes what the newest checkpoint replaces, and the oldest ones."""
-    others = [(at, path) for at, _, path in _tries(run) if path != newest]
-    earlier = [path for at, path in others if at < step]
-    kept = earlier[max(0, len(earlier) - keep + 1) :]
-    for _, path in others:
-        if path not in kept:
-            path.replace(path.with_name(f".{path.name}"))  # gone at once; its files follow
-    _sweep(run)
+def _all(run: RunFolder) -> list[_Saved]:
+    """Returns the checkpoints on disk, the newest last."""
+    paths = run.checkpoints.iterdir() if run.checkpoints.is_dir() else ()
+    matches = [(FOLDER.fullmatch(path.name), path) for path in paths]
+    return sorted(_Saved(int(of[1]), int(of[2] or 1), path) for of, path in matches if of)
 
 
-def _saved_blocks(run: RunFolder, step: int) -> set[Path]:
-    """Returns the blocks on disk that earlier checkpoints need.
+def _new_folder(run: RunFolder, step: int) -> Path:
+    """Returns a folder that is not there: no checkpoint is replaced before the next is whole."""
+    attempts = [saved.attempt for saved in _all(run) if saved.step == step]
+    return run.checkpoints / (f"{step:09d}" + (f".{attempts[-1] + 1}" if attempts else ""))
 
-    Those of later ones alone do not count: the run went back, perhaps because they are torn.
+
+def _blocks_before(run: RunFolder, step: int) -> set[str]:
+    """Returns the files of blocks that are there and belong to an earlier checkpoint.
+
+    What belongs to later ones only is not trusted: perhaps the run went back because it is torn.
     """
-    saved = set()
-    for at, _, folder in _tries(run):
-        with suppress(TrdlabError):  # it is torn: what it needs is written again
-            blocks = _index(folder)[1] if at < step else {}
-            saved |= {run.replay / _block_name(*block) for block in blocks.items()}
-    return {path for path in saved if path.exists()}
+    known: set[str] = set()
+    for saved in _all(run):
+        with suppress(TrdlabError):  # torn: its blocks are written again
+            if saved.step < step:
+                known |= set(Index.read(saved.folder).block_files.values())
+    return {name for name in known if (run.replay / name).exists()}
+
+
+def _forget(run: RunFolder, step: int, newest: Path, keep: int) -> None:
+    """Deletes what the newest checkpoint replaces, and the oldest ones."""
+    others = [saved for saved in _all(run) if saved.folder != newest]
+    earlier = [saved for saved in others if saved.step < step]
+    kept = earlier[max(0, len(earlier) - keep + 1) :]
+    try:
+        for _, _, folder in (saved for saved in others if saved not in kept):
+            folder.replace(folder.with_name(f".{folder.name}"))  # gone at once; its files follow
+        _sweep(run)
+    except OSError as error:
+        raise OutputError(
+            f"The checkpoint at step {step} is saved, but an old one cannot be deleted: "
+            f"{error.strerror or error}.",
+            f"See to '{run.path}'.",
+        ) from error
 
 
 def _sweep(run: RunFolder) -> None:
@@ -210,115 +231,55 @@ def _sweep(run: RunFolder) -> None:
         for path in filter(is_leftover, folder.iterdir()):
             remove(path)
     try:
-        indices = [_index(path) for _, _, path in _tries(run)]
-    except TrdlabError:  # nobody knows what that one needs
+        needed = {file for of in _all(run) for file in Index.read(of.folder).block_files.values()}
+    except TrdlabError:  # one is torn, and nobody knows what it needs
         return
-    needed = {_block_name(*block) for _, blocks in indices for block in blocks.items()}
     for path in run.replay.iterdir():
         if path.name not in needed:
             path.unlink()
 
 
-def _tries(run: RunFolder) -> list[tuple[int, int, Path]]:
-    """Returns step, number and folder of all checkpoints, the newest last."""
-    paths = run.checkpoints.iterdir() if run.checkpoints.is_dir() else ()
-    matches = [(FOLDER.fullmatch(path.name), path) for path in paths]
-    return sorted((int(of[1]), int(of[2] or 1), path) for of, path in matches if of)
-
-
-def _folders(run: RunFolder) -> dict[int, Path]:
-    """Returns the folder of the checkpoint at each step, the newest last."""
-    return {step: path for step, _, path in _tries(run)}
-
-
-def _new_folder(run: RunFolder, step: int) -> Path:
-    """Returns a folder that is not there yet: a checkpoint is never replaced in place."""
-    numbers = [number for at, number, _ in _tries(run) if at == step]
-    return run.checkpoints / (f"{step:09d}" + (f".{numbers[-1] + 1}" if numbers else ""))
-
-
-def _chosen(run: RunFolder, step: int | None) -> int:
-    steps = checkpoint_steps(run)
-    if not steps:
+def _chosen(run: RunFolder, step: int | None) -> _Saved:
+    saved = {saved.step: saved for saved in _all(run)}
+    if not saved:
         raise InputError(
             f"The run '{run.path}' has no checkpoint: it ended before the first one.",
             "Begin it anew, with another --out.",
         )
-    if step is not None and step not in steps:
+    if step is not None and step not in saved:
         raise InputError(
             f"The run '{run.path}' has no checkpoint at step {step}.",
-            f"There are: {', '.join(map(str, steps))}.",
+            f"There are: {', '.join(map(str, saved))}.",
         )
-    return steps[-1] if step is None else step
-
-
-def _index(folder: Path) -> tuple[Sums, Sums]:
-    """Returns the sums of a checkpoint's files, and of the blocks that it needs."""
-    index = read_json(folder / INDEX)
-    try:
-        files, blocks = (
-            {name: (int(length), int(crc)) for name, (length, crc) in index[part].items()}
-            for part in ("files", "blocks")
-        )
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
-        raise TrdlabError(f"'{folder / INDEX}' is torn.") from error
-    for name in (*files, *blocks):
-        if not NAME.fullmatch(name):  # it might lead to another folder
-            raise TrdlabError(f"'{folder / INDEX}' has a file named '{name}'.")
-    return files, blocks
-
-
-def _written(path: Path, data: bytes) -> tuple[int, int]:
-    path.write_bytes(data)
-    return _sum(data)
-
-
-def _read(path: Path, expected: tuple[int, int]) -> bytes:
-    """Returns what is in a file, if it is what was written."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise TrdlabError(f"'{path}' cannot be read: {error.strerror or error}.") from error
-    if len(data) != expected[0]:
-        raise TrdlabError(f"'{path}' has {len(data)} bytes instead of {expected[0]}.")
-    if _sum(data) != expected:
-        raise TrdlabError(f"'{path}' is not what was written: its checksum is wrong.")
-    return data
-
-
-def _arrays(path: Path, expected: tuple[int, int]) -> Arrays:
-    data = _read(path, expected)
-    try:
-        return load(data)
-    except (SafetensorError, KeyError) as error:  # it was doctored: its sum is right
-        raise TrdlabError(f"'{path}' is no valid safetensors file: {error}.") from error
-
-
-def _sum(data: Any) -> tuple[int, int]:
-    return memoryview(data).nbytes, crc32(data)
-
-
-def _block_name(name: str, sum_: tuple[int, int]) -> str:
-    return f"{name}-{sum_[1]:08x}"
+    return saved[max(saved) if step is None else step]
 
 
 def _not_saved(run: RunFolder, step: int, error: OutputError | OSError) -> OutputError:
     cause = error.cause if isinstance(error, OutputError) else f"{error.strerror or error}."
     steps = checkpoint_steps(run)
+    again = (
+        f"When it can be written again, trdlab resume {shlex.quote(str(run.path))} goes on from "
+    )
     return OutputError(
-        f"The checkpoint at step {step} is not saved: {cause}",
-        f"Make room; trdlab resume {shlex.quote(str(run.path))} goes on from step {steps[-1]}."
-        if steps
-        else "Make room, and begin anew: it would have been the first.",
+        f"The checkpoint at step {step} cannot be saved: {cause}",
+        again + (f"step {steps[-1]}." if steps else "the beginning."),
     )
 
 
-def _torn(run: RunFolder, step: int, error: TrdlabError) -> TrdlabError:
-    others = (other for other in reversed(checkpoint_steps(run)) if other != step)
-    whole = next((other for other in others if _is_whole(run, other)), None)
+def _torn(run: RunFolder, torn: _Saved, error: TrdlabError) -> TrdlabError:
+    whole = (other.step for other in reversed(_all(run)) if other != torn and _is_whole(run, other))
+    step = next(whole, None)
     return TrdlabError(
-        f"The checkpoint at step {step} cannot be used: {error.cause}",
+        f"The checkpoint at step {torn.step} cannot be used: {error.cause}",
         "No other one is whole."
-        if whole is None
-        else f"The one at step {whole} is whole: --checkpoint {whole}.",
+        if step is None
+        else f"The one at step {step} is whole: --checkpoint {step}.",
     )
+
+
+def _is_whole(run: RunFolder, saved: _Saved) -> bool:
+    try:
+        _load(run, saved)
+    except TrdlabError:
+        return False
+    return True

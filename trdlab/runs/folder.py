@@ -1,12 +1,11 @@
-"""The folder of a run: how it is made, opened and named, and who may write to it."""
+"""The folder of a run: how it is made, opened and named."""
 
-import os
+import json
 import platform
 import shlex
-import socket
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -14,18 +13,15 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Self
 
-from filelock import FileLock, Timeout
-
 from trdlab.errors import InputError, OutputError, TrdlabError, closest
-from trdlab.files import read_json, write_json, write_whole
+from trdlab.files import read_json, write_whole
 from trdlab.runs.config import Config, read_config, to_toml
+from trdlab.runs.lock import hold
 
 FORMAT = 1
 """Of the run folder; a change that older versions cannot read raises it."""
 PACKAGES = ("numpy", "torch", "gymnasium", "ale-py", "lz4", "safetensors")
-CONFIG, MANIFEST, LOCK, HOLDER = "config.toml", "manifest.json", ".lock", ".holder.json"
-PATIENCE = 1.0
-"""Seconds to wait for the lock: `trdlab runs` takes it for a moment to see whether it is free."""
+CONFIG, MANIFEST = "config.toml", "manifest.json"
 
 
 @dataclass(frozen=True)
@@ -57,24 +53,25 @@ class RunFolder:
             InputError: the configuration cannot be written as TOML.
             OutputError: there is something already, or it cannot be written.
         """
-        text, manifest = to_toml(config), {**new_manifest(), **(manifest_extra or {})}
+        config_text = to_toml(config)
+        manifest_text = json.dumps({**new_manifest(), **(manifest_extra or {})}, indent=1)
         check_free(path)
 
-        def write(temporary: Path) -> None:
-            for name in ("", "checkpoints", "replay", "evaluations"):
-                (temporary / name).mkdir()
-            (temporary / CONFIG).write_text(text, encoding="utf-8")
-            write_json(temporary / MANIFEST, manifest)
+        def write(folder: Path) -> None:
+            folder.mkdir()
+            for name in ("checkpoints", "replay", "evaluations"):
+                (folder / name).mkdir()
+            (folder / CONFIG).write_text(config_text, encoding="utf-8")
+            (folder / MANIFEST).write_text(manifest_text + "\n", encoding="utf-8")
 
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, write)
         except OSError as error:
             reason = error.strerror or error
             raise OutputError(
                 f"Cannot make '{path}': {reason}.", "Choose another --out."
             ) from error
-        try:
-            write_whole(path, write)
         except OutputError:
             check_free(path)  # another process may have made it meanwhile
             raise
@@ -90,21 +87,15 @@ class RunFolder:
         """
         if not is_run(path):
             what = f"The folder '{path}' holds no run" if path.is_dir() else f"There is no '{path}'"
-            runs = run_paths(path.parent)
-            near = closest(path.name, [run.name for run in runs]) if runs else ""
-            raise InputError(f"{what}.", near or "Name the folder that `trdlab train` made.")
-        manifest = read_json(path / MANIFEST)
-        written = manifest.get("format") if isinstance(manifest, dict) else None
-        if not isinstance(written, int):
-            raise TrdlabError(f"'{path / MANIFEST}' is torn: it does not say its format.")
-        if written != FORMAT:
-            author = manifest.get("trdlab")
-            raise TrdlabError(
-                f"The run '{path}' has format {written}, written by trdlab {author}; "
-                f"trdlab {_version('trdlab')} reads format {FORMAT}.",
-                f"Use trdlab {author}" + (" or newer." if written > FORMAT else "."),
-            )
-        return cls(path, read_config(path / CONFIG), manifest)
+            runs = [run.name for run in run_paths(path.parent)]
+            cure = closest(path.name, runs) if runs else "Name the folder that `trdlab train` made."
+            raise InputError(f"{what}.", cure)
+        try:
+            manifest = read_json(path / MANIFEST)
+            _check_format(path, manifest)
+            return cls(path, read_config(path / CONFIG), manifest)
+        except InputError as error:  # the file is the run's, not the user's
+            raise TrdlabError(error.cause, "Put it right, or begin another run.") from error
 
     @property
     def metrics(self) -> Path:
@@ -126,36 +117,9 @@ class RunFolder:
         """The folder with the results of evaluations."""
         return self.path / "evaluations"
 
-    @contextmanager
-    def held(self) -> Iterator[None]:
-        """Holds the run for this process alone, as long as the block lasts, or the process.
-
-        Raises:
-            TrdlabError: another one holds it.
-            OutputError: the folder cannot be written.
-        """
-        lock = FileLock(self.path / LOCK)
-        try:
-            lock.acquire(timeout=PATIENCE, poll_interval=0.1)
-        except Timeout as error:
-            pid = _read_holder(self.path)
-            raise TrdlabError(
-                f"The run '{self.path}' is held by {f'process {pid}' if pid else 'a process'}, "
-                "which trains it.",
-                f"Wait until it ends, or end it: kill {pid}" if pid else "Wait until it ends.",
-            ) from error
-        except OSError as error:
-            reason = error.strerror or error
-            raise OutputError(
-                f"The run '{self.path}' cannot be locked: {reason}.", "Copy it to another place."
-            ) from error
-        try:
-            write_json(self.path / HOLDER, {"pid": os.getpid(), "host": socket.gethostname()})
-            yield
-        finally:
-            with suppress(OSError):  # the lock is what counts
-                (self.path / HOLDER).unlink()
-            lock.release()
+    def held(self) -> AbstractContextManager[None]:
+        """Holds the run for this process alone, see `trdlab.runs.lock.hold`."""
+        return hold(self.path)
 
 
 def new_manifest() -> dict[str, Any]:
@@ -202,34 +166,25 @@ def is_run(path: Path) -> bool:
 
 def run_paths(parent: Path) -> list[Path]:
     """Returns the folders of runs in a folder, by name."""
-    if not parent.is_dir():
-        return []
-    return sorted(path for path in parent.iterdir() if path.name[0] != "." and is_run(path))
+    paths = sorted(parent.iterdir()) if parent.is_dir() else []
+    return [path for path in paths if path.name[0] != "." and is_run(path)]
 
 
-def holder(path: Path) -> int | None:
-    """Returns the process that trains a run, 0 if its number is not known, None if there is none.
-
-    Raises:
-        OSError: it cannot be told, because the folder cannot be written.
-    """
-    if not (path / LOCK).exists():
-        return None
-    try:
-        with FileLock(path / LOCK).acquire(timeout=0):
-            return None
-    except Timeout:
-        return _read_holder(path)
-
-
-def _read_holder(path: Path) -> int:
-    try:
-        return int(read_json(path / HOLDER)["pid"])
-    except (TrdlabError, TypeError, KeyError, ValueError):
-        return 0
+def _check_format(path: Path, manifest: Any) -> None:
+    written = manifest.get("format") if isinstance(manifest, dict) else None
+    if not isinstance(written, int):
+        raise TrdlabError(f"'{path / MANIFEST}' is torn: it does not say its format.")
+    if written != FORMAT:
+        author = manifest.get("trdlab")
+        raise TrdlabError(
+            f"The run '{path}' has format {written}, written by trdlab {author}; "
+            f"this is trdlab {_version('trdlab')}, which reads format {FORMAT}.",
+            f"Use trdlab {author}{' or newer' if written > FORMAT else ''}.",
+        )
 
 
 def _version(package: str) -> str | None:
-    with suppress(metadata.PackageNotFoundError):
+    try:
         return metadata.version(package)
-    return None
+    except metadata.PackageNotFoundError:
+        return None

@@ -6,7 +6,8 @@ from typing import Any
 
 from trdlab.errors import TrdlabError
 from trdlab.runs.checkpoint import checkpoint_steps
-from trdlab.runs.folder import RunFolder, holder, run_paths
+from trdlab.runs.folder import RunFolder, run_paths
+from trdlab.runs.lock import holder
 from trdlab.runs.metrics import last_metrics
 
 

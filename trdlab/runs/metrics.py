@@ -22,8 +22,9 @@ class MetricsFile:
 
     Args:
         path: the file; it is made if it is not there.
-        length: the bytes to go on after, from a checkpoint: what an interrupted run wrote
-            later is cut off, because it will be written again. Without it, nothing is cut off.
+        length: the bytes to go on after, as `sync` returned them for a checkpoint. What an
+            interrupted run wrote later is cut off, because it will be written again. Without it,
+            only a line that was not finished is.
 
     Raises:
         TrdlabError: the file is shorter than that.
@@ -35,8 +36,7 @@ class MetricsFile:
         try:
             self._file = path.open("ab", buffering=0)
             self._length = os.fstat(self._file.fileno()).st_size
-            if length is not None:
-                self._cut(length)
+            self._cut(path.read_bytes().rfind(b"\n") + 1 if length is None else length)
         except OSError as error:
             raise self._cannot_write(error) from error
 
@@ -86,14 +86,15 @@ class MetricsFile:
             self.close()
             raise TrdlabError(
                 f"'{self.path}' has {self._length} bytes, and had {length} at the checkpoint.",
-                "Put the lines back, or go back to an earlier checkpoint with --checkpoint STEP.",
+                "Put the lines back, or go back to an earlier one: --checkpoint STEP.",
             )
         self._file.truncate(length)
         self._length = length
 
     def _cannot_write(self, error: OSError) -> OutputError:
         return OutputError(
-            f"Cannot write '{self.path}': {error.strerror or error}.", "Make room, and resume."
+            f"Cannot write '{self.path}': {error.strerror or error}.",
+            "When it can be written again, resume the run.",
         )
 
 

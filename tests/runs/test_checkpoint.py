@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 import pytest
@@ -164,7 +165,7 @@ def test_going_back_replaces_what_came_after(run):
 
 
 def test_a_run_without_a_checkpoint_says_so(run):
-    with pytest.raises(InputError, match=r"has no checkpoint: it ended before the first one\."):
+    with pytest.raises(InputError, match=r"has no checkpoint yet\. Train on: trdlab resume"):
         load_checkpoint(run)
     save_checkpoint(run, 1, {})
     with pytest.raises(InputError, match=r"no checkpoint at step 3\. There are: 1\."):
@@ -226,6 +227,57 @@ def test_a_doctored_index_leads_nowhere(run, tmp_path):
         index.write_text(doctored)
         with pytest.raises(TrdlabError, match=r"index\.json' is torn"):
             load_checkpoint(run)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> RunFolder:
+    """A run that tests damage and restore."""
+    run = RunFolder.create(tmp_path_factory.mktemp("runs") / "whole", {})
+    save_checkpoint(run, 1, a_state(1), some_blocks(1, 2))
+    return run
+
+
+@given(st.data())
+def test_a_byte_that_changes_is_noticed(whole, data):
+    paths = sorted(path for path in whole.path.rglob("0*/*") if path.is_file())
+    path = data.draw(st.sampled_from(paths + sorted(whole.replay.iterdir())))
+    before = path.read_bytes()
+    after = bytearray(before)
+    place = data.draw(st.integers(0, len(before) - 1))
+    after[place] = data.draw(st.integers(0, 255))
+    path.write_bytes(after)
+    try:
+        loaded = load_checkpoint(whole)
+    except TrdlabError:
+        assert after != before
+    else:
+        assert same(loaded.state, a_state(1))
+        assert loaded.blocks == some_blocks(1, 2)
+    finally:
+        path.write_bytes(before)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("state.json", b"[]"),
+        ("state.json", b'{"x": {"$float": []}}'),
+        ("state.json", b'{"x": {"$array": "missing"}}'),
+        ("state.json", b'{"x": {"$array": ["y"]}}'),
+        ("state.json", b'{"x": ' + b"[" * 100_000),
+        ("x.safetensors", b"cos\nsystem\n(S'true'\ntR."),  # a pickle
+        ("x.safetensors", (2**62).to_bytes(8, "little")),
+    ],
+)
+def test_files_that_were_never_ours_are_refused_although_their_sums_are_right(run, name, content):
+    save_checkpoint(run, 1, {"x": np.zeros(2)})
+    folder = run.checkpoints / "000000001"
+    (folder / name).write_bytes(content)
+    index = json.loads((folder / "index.json").read_text())
+    index["files"][name] = [len(content), crc32(content)]
+    (folder / "index.json").write_text(json.dumps(index))
+    with pytest.raises(TrdlabError, match=r"step 1 cannot be used: .*No other"):
+        load_checkpoint(run)
 
 
 # ---- what cannot be written --------------------------------------------------------------------

@@ -7,26 +7,25 @@ changes, so that checkpoints can share it.
 """
 
 import json
-import re
 import shlex
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from trdlab.errors import InputError, OutputError, TrdlabError, closest
-from trdlab.files import is_leftover, remove, write_whole
+from trdlab.files import write_whole
 from trdlab.runs.folder import RunFolder
 from trdlab.runs.index import Index, Sum, check_names, read_whole
+from trdlab.runs.keeping import Saved, all_saved, blocks_before, forget, new_folder, sweep
 from trdlab.runs.state import Arrays, pack, unpack
 
 STATE, TENSORS = "state.json", ".safetensors"
-FOLDER = re.compile(r"(\d+)(?:\.(\d+))?")  # a step, and which try where there were several
 
 
 @dataclass(frozen=True)
@@ -42,14 +41,6 @@ class Checkpoint:
     step: int
     state: dict[str, Any]
     blocks: dict[str, bytes]
-
-
-class _Saved(NamedTuple):
-    """A checkpoint on disk; the later of two sorts last."""
-
-    step: int
-    attempt: int
-    folder: Path
 
 
 def save_checkpoint(
@@ -82,17 +73,17 @@ def save_checkpoint(
     check_names((*arrays, *blocks))
     index = Index({}, {name: Sum.of(block) for name, block in blocks.items()})
     try:
-        _sweep(run)  # makes room before room is needed
-        folder, there = _new_folder(run, step), _blocks_before(run, step)
+        sweep(run)  # makes room before room is needed
+        folder, there = new_folder(run, step), blocks_before(run, step)
         for name, file in index.block_files.items():
             if file not in there:
                 write_whole(run.replay / file, partial(Path.write_bytes, data=blocks[name]))
         write_whole(folder, lambda temporary: _write(temporary, tree, arrays, index.blocks))
     except (OutputError, OSError) as error:
         with suppress(OSError):  # the first failure is the one to tell
-            _sweep(run)
+            sweep(run)
         raise _not_saved(run, step, error) from error
-    _forget(run, step, folder, keep)
+    forget(run, step, folder, keep)
 
 
 def load_checkpoint(run: RunFolder, step: int | None = None) -> Checkpoint:
@@ -129,13 +120,14 @@ def read_arrays(run: RunFolder, key: str, step: int | None = None) -> Arrays:
         raise _torn(run, saved, error) from error
     if arrays is None:
         keys = [name.removesuffix(TENSORS) for name in files if name != STATE]
-        raise InputError(f"The checkpoint at step {saved.step} has no '{key}'.", closest(key, keys))
+        cure = closest(key, keys) if keys else ""
+        raise InputError(f"The checkpoint at step {saved.step} has no '{key}'.", cure)
     return arrays
 
 
 def checkpoint_steps(run: RunFolder) -> list[int]:
     """Returns the steps at which there is a checkpoint, the newest last."""
-    return sorted({saved.step for saved in _all(run)})
+    return list(_by_step(run))
 
 
 def _write(
@@ -155,17 +147,17 @@ def _write(
     Index(sums, blocks).write(folder)
 
 
-def _load(run: RunFolder, saved: _Saved) -> Checkpoint:
+def _load(run: RunFolder, saved: Saved) -> Checkpoint:
     index, folder = Index.read(saved.folder), saved.folder
-    files = dict(index.files)
-    try:
-        tree = json.loads(read_whole(folder / STATE, files.pop(STATE)))
-    except (KeyError, ValueError, RecursionError) as error:  # it was doctored: its sum is right
-        raise TrdlabError(f"'{folder / STATE}' is not valid: {error}.") from error
     arrays = {
-        name.removesuffix(TENSORS): _arrays(folder / name, sum_) for name, sum_ in files.items()
+        name.removesuffix(TENSORS): _arrays(folder / name, sum_)
+        for name, sum_ in index.files.items()
+        if name != STATE
     }
-    state = unpack(tree, arrays)
+    try:
+        state = unpack(json.loads(read_whole(folder / STATE, index.files[STATE])), arrays)
+    except _DOCTORED as error:
+        raise TrdlabError(f"'{folder / STATE}' is not valid: {error!r}.") from error
     blocks = {
         name: read_whole(run.replay / file, index.blocks[name])
         for name, file in index.block_files.items()
@@ -173,78 +165,28 @@ def _load(run: RunFolder, saved: _Saved) -> Checkpoint:
     return Checkpoint(saved.step, state, blocks)
 
 
+_DOCTORED = (LookupError, ValueError, TypeError, AttributeError, RecursionError)
+"""What is raised by a file that is not valid although its sum is right: it was never ours."""
+
+
 def _arrays(path: Path, expected: Sum) -> Arrays:
     data = read_whole(path, expected)
     try:
         return dict(sorted(load(data).items()))  # it has no order of its own
-    except (SafetensorError, KeyError) as error:  # it was doctored: its sum is right
+    except (SafetensorError, *_DOCTORED) as error:
         raise TrdlabError(f"'{path}' is no valid safetensors file: {error}.") from error
 
 
-def _all(run: RunFolder) -> list[_Saved]:
-    """Returns the checkpoints on disk, the newest last."""
-    paths = run.checkpoints.iterdir() if run.checkpoints.is_dir() else ()
-    matches = [(FOLDER.fullmatch(path.name), path) for path in paths]
-    return sorted(_Saved(int(of[1]), int(of[2] or 1), path) for of, path in matches if of)
+def _by_step(run: RunFolder) -> dict[int, Saved]:
+    """Returns the checkpoint at each step, the newest last."""
+    return {saved.step: saved for saved in all_saved(run)}
 
 
-def _new_folder(run: RunFolder, step: int) -> Path:
-    """Returns a folder that is not there: no checkpoint is replaced before the next is whole."""
-    attempts = [saved.attempt for saved in _all(run) if saved.step == step]
-    return run.checkpoints / (f"{step:09d}" + (f".{attempts[-1] + 1}" if attempts else ""))
-
-
-def _blocks_before(run: RunFolder, step: int) -> set[str]:
-    """Returns the files of blocks that are there and belong to an earlier checkpoint.
-
-    What belongs to later ones only is not trusted: perhaps the run went back because it is torn.
-    """
-    known: set[str] = set()
-    for saved in _all(run):
-        with suppress(TrdlabError):  # torn: its blocks are written again
-            if saved.step < step:
-                known |= set(Index.read(saved.folder).block_files.values())
-    return {name for name in known if (run.replay / name).exists()}
-
-
-def _forget(run: RunFolder, step: int, newest: Path, keep: int) -> None:
-    """Deletes what the newest checkpoint replaces, and the oldest ones."""
-    others = [saved for saved in _all(run) if saved.folder != newest]
-    earlier = [saved for saved in others if saved.step < step]
-    kept = earlier[max(0, len(earlier) - keep + 1) :]
-    try:
-        for _, _, folder in (saved for saved in others if saved not in kept):
-            folder.replace(folder.with_name(f".{folder.name}"))  # gone at once; its files follow
-        _sweep(run)
-    except OSError as error:
-        raise OutputError(
-            f"The checkpoint at step {step} is saved, but an old one cannot be deleted: "
-            f"{error.strerror or error}.",
-            f"See to '{run.path}'.",
-        ) from error
-
-
-def _sweep(run: RunFolder) -> None:
-    """Deletes what killed processes left, and the blocks that no checkpoint needs."""
-    for folder in (run.checkpoints, run.replay):
-        folder.mkdir(exist_ok=True)  # some ways to copy a run leave out empty folders
-        for path in filter(is_leftover, folder.iterdir()):
-            remove(path)
-    try:
-        needed = {file for of in _all(run) for file in Index.read(of.folder).block_files.values()}
-    except TrdlabError:  # one is torn, and nobody knows what it needs
-        return
-    for path in run.replay.iterdir():
-        if path.name not in needed:
-            path.unlink()
-
-
-def _chosen(run: RunFolder, step: int | None) -> _Saved:
-    saved = {saved.step: saved for saved in _all(run)}
+def _chosen(run: RunFolder, step: int | None) -> Saved:
+    saved = _by_step(run)
     if not saved:
         raise InputError(
-            f"The run '{run.path}' has no checkpoint: it ended before the first one.",
-            "Begin it anew, with another --out.",
+            f"The run '{run.path}' has no checkpoint yet.", f"Train on: {_resume(run)}."
         )
     if step is not None and step not in saved:
         raise InputError(
@@ -257,29 +199,31 @@ def _chosen(run: RunFolder, step: int | None) -> _Saved:
 def _not_saved(run: RunFolder, step: int, error: OutputError | OSError) -> OutputError:
     cause = error.cause if isinstance(error, OutputError) else f"{error.strerror or error}."
     steps = checkpoint_steps(run)
-    again = (
-        f"When it can be written again, trdlab resume {shlex.quote(str(run.path))} goes on from "
-    )
+    begin = f"step {steps[-1]}" if steps else "the beginning"
     return OutputError(
         f"The checkpoint at step {step} cannot be saved: {cause}",
-        again + (f"step {steps[-1]}." if steps else "the beginning."),
+        f"When it can be written again, {_resume(run)} goes on from {begin}.",
     )
 
 
-def _torn(run: RunFolder, torn: _Saved, error: TrdlabError) -> TrdlabError:
-    whole = (other.step for other in reversed(_all(run)) if other != torn and _is_whole(run, other))
-    step = next(whole, None)
+def _torn(run: RunFolder, torn: Saved, error: TrdlabError) -> TrdlabError:
+    others = [saved for saved in _by_step(run).values() if saved.step != torn.step]
+    whole = next((saved.step for saved in reversed(others) if _is_whole(run, saved)), None)
     return TrdlabError(
         f"The checkpoint at step {torn.step} cannot be used: {error.cause}",
         "No other one is whole."
-        if step is None
-        else f"The one at step {step} is whole: --checkpoint {step}.",
+        if whole is None
+        else f"The one at step {whole} is whole: --checkpoint {whole}.",
     )
 
 
-def _is_whole(run: RunFolder, saved: _Saved) -> bool:
+def _is_whole(run: RunFolder, saved: Saved) -> bool:
     try:
         _load(run, saved)
     except TrdlabError:
         return False
     return True
+
+
+def _resume(run: RunFolder) -> str:
+    return f"trdlab resume {shlex.quote(str(run.path))}"

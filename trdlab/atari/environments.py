@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
 from trdlab.arrays import BoolArray, IntArray
@@ -50,7 +51,7 @@ class AtariEnvironments:
     [0.0, 0.0]
     """
 
-    observation_space = FRAME
+    observation_space: gym.Space[Any] = FRAME
     first_action = 0
     stack: int | None = STACK
     padding: Padding = "zero"

@@ -15,6 +15,7 @@ from trdlab.errors import InputError, TrdlabError, closest
 # By its name, as Gymnasium finds entry points: what registers our maps stands above this layer.
 _REGISTERED_BY = {"trdlab": "trdlab.envs", "ALE": "ale_py"}
 _EXTRAS = {"box2d": "trdlab[box2d]"}
+_WRONG_VALUE = (TypeError, ValueError, LookupError, AssertionError, AttributeError)
 _LISTED = 'python -c "import gymnasium; gymnasium.pprint_registry()" lists those that there are.'
 
 
@@ -44,21 +45,18 @@ def make_environment(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # an old version was asked for by its number
-            spec = _spec(env_id)
+            spec = _find(env_id, known)
             _check_arguments(spec, given)
             return gym.make(spec, disable_env_checker=True, **given)
     except TrdlabError:
         raise
     except gym.error.DependencyNotInstalled as error:
         raise InputError(*_missing(env_id, error)) from error
-    except gym.error.Error as error:
-        cause = f"There is no environment '{env_id}'."
-        raise InputError(cause, _suggestion(env_id, known)) from error
     except ImportError as error:
         raise InputError(
             f"{env_id} cannot be imported: {error}.", "Install what it needs, or check the id."
         ) from error
-    except (TypeError, ValueError, LookupError, AssertionError, AttributeError, OSError) as error:
+    except (*_WRONG_VALUE, OSError, gym.error.Error) as error:
         made = f" with {say_arguments(given)}" if given else ""
         reason = str(error).partition(" was raised from the environment creator")[0]
         raise InputError(
@@ -67,12 +65,16 @@ def make_environment(
         ) from error
 
 
-def _spec(env_id: str) -> Any:
+def _find(env_id: str, known: Iterable[str] | None) -> Any:
     module, _, name = env_id.rpartition(":")
     module = module or _REGISTERED_BY.get(name.partition("/")[0], "")
     if module:
         import_module(module)
-    return gym.spec(name)
+    try:
+        return gym.spec(name)
+    except gym.error.Error as error:
+        cause = f"There is no environment '{env_id}'."
+        raise InputError(cause, _suggestion(env_id, known)) from error
 
 
 def _suggestion(env_id: str, known: Iterable[str] | None) -> str:

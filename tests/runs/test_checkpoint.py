@@ -206,6 +206,18 @@ def test_a_torn_checkpoint_is_named_and_never_skipped(run, name, damage):
     assert same(load_checkpoint(run).state, a_state(2))
 
 
+def test_no_block_is_deleted_while_nobody_knows_who_needs_it(run):
+    for step in (1, 2):
+        save_checkpoint(run, step, a_state(step), some_blocks(step))
+    index = run.checkpoints / "000000001" / "index.json"
+    text = index.read_bytes()
+    cut(index)
+    save_checkpoint(run, 3, a_state(3), some_blocks(3), keep=3)
+    assert len(files(run.replay)) == 3
+    index.write_bytes(text)  # somebody has put it right
+    assert load_checkpoint(run, 1).blocks == some_blocks(1)
+
+
 def test_advice_is_given_only_where_it_holds(run):
     for step in (1, 2):
         save_checkpoint(run, step, a_state(step))

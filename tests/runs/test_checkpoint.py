@@ -107,7 +107,7 @@ def test_one_part_is_read_alone(run):
     ("value", "kind"),
     [
         ((1, 2), "tuple"),
-        (np.zeros(2, np.complex128), "array of complex128"),
+        (np.zeros(2, np.complex64), "array of complex64"),
         (np.zeros(2, ">f4"), "array of >f4"),
         (np.array([None]), "array of object"),
         ({1: 2}, "dict"),

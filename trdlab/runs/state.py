@@ -12,7 +12,7 @@ from trdlab.errors import InputError, TrdlabError
 Array = npt.NDArray[Any]
 Arrays = dict[str, Array]
 
-DTYPES = frozenset(np.dtype(code) for code in "?bhilqBHILQefdF")
+DTYPES = frozenset(np.dtype(code) for code in "?bhilqBHILQefd")
 """What safetensors and numpy both know; in the byte order of this machine."""
 ARRAY, BYTES, FLOAT = "$array", "$bytes", "$float"
 

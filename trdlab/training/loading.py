@@ -2,9 +2,12 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import gymnasium as gym
 
 from trdlab.deep.settings import TrainSettings
+from trdlab.errors import TrdlabError
 from trdlab.evaluation import Evaluation, evaluate
 from trdlab.files import write_json
 from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
@@ -37,15 +40,22 @@ def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
 
     folder = RunFolder.open(Path(path))
     settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
-    environment = folder.manifest["environment"]
-    network = build_network(
-        described_space(environment["observation"]),
-        environment["num_actions"],
-        settings.time_axis,
-        hidden=settings.hidden,
-    )
+    space, num_actions = _described(folder)
+    network = build_network(space, num_actions, settings.time_axis, hidden=settings.hidden)
     load_weights(network, read_arrays(folder, "q_network", step))
     return NetworkEstimator(network, settings.time_axis, future(settings))
+
+
+def _described(folder: RunFolder) -> tuple[gym.Space[Any], int]:
+    """Returns the observation space and the number of actions that a run was made with."""
+    try:
+        environment = folder.manifest["environment"]
+        return described_space(environment["observation"]), int(environment["num_actions"])
+    except (LookupError, TypeError, ValueError) as error:
+        raise TrdlabError(
+            f"The run '{folder.path}' does not say what its agent sees: its manifest is torn.",
+            "Put back the manifest.json that was written when it began.",
+        ) from error
 
 
 def evaluate_run(

@@ -62,22 +62,6 @@ class Run:
         state["run"] = {"metrics_length": self.metrics.sync(), "seconds": self.seconds}
         save_checkpoint(self.folder, self.trainer.agent_steps, state, blocks)
 
-    def restore(self, step: int | None = None) -> None:
-        """Goes back to a checkpoint, by default the newest.
-
-        Raises:
-            InputError: there is none, or the configuration has been changed since.
-            TrdlabError: it is torn.
-        """
-        checkpoint = load_checkpoint(self.folder, step)
-        state: dict[str, Any] = checkpoint.state
-        _check_unchanged(state["settings"], self.trainer.settings.to_config(), checkpoint.step)
-        state["learner"]["q_network"] = state.pop("q_network")
-        state["memory"]["frames"]["sealed"] = checkpoint.blocks
-        self.problem = self.trainer.load_state_dict(state)
-        self.seconds = state["run"]["seconds"]
-        self.metrics = MetricsFile(self.folder.metrics, state["run"]["metrics_length"])
-
 
 @contextmanager
 def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
@@ -114,15 +98,13 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(folder.held())
         trainer, memory = _trainer(settings, stack)
-        begun = bool(checkpoint_steps(folder)) or step is not None
-        run = Run(folder, trainer, MetricsFile(folder.metrics, None if begun else 0), memory)
-        stack.callback(lambda: run.metrics.close())
-        if begun:
-            run.metrics.close()
-            run.restore(step)
+        if checkpoint_steps(folder) or step is not None:
+            length, seconds, problem = _restore(trainer, folder, step)
         else:
             _check_same_weights(folder, _given_weights(trainer))
-        yield run
+            length, seconds, problem = 0, 0.0, None
+        metrics = stack.enter_context(MetricsFile(folder.metrics, length))
+        yield Run(folder, trainer, metrics, memory, seconds, problem)
 
 
 def carry_on(
@@ -148,6 +130,8 @@ def carry_on(
         OutputError: the disk is full; likewise.
     """
     trainer, settings = run.trainer, run.trainer.settings
+    if trainer.done:  # and saved
+        return True
     saved, since = -1, time.perf_counter()
     while not trainer.done and not should_stop():
         before = trainer.agent_steps
@@ -174,6 +158,23 @@ def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
     memory = memory_of(settings, environments)
     check_memory(memory, settings.capacity)
     return new_trainer(resolved(settings, environments), environments), memory
+
+
+def _restore(
+    trainer: Trainer, folder: RunFolder, step: int | None
+) -> tuple[int, float, TrdlabError | None]:
+    """Puts a trainer where a checkpoint stands.
+
+    Returns:
+        The length of the metrics then, the seconds of training, and what could not be restored.
+    """
+    checkpoint = load_checkpoint(folder, step)
+    state: dict[str, Any] = checkpoint.state
+    _check_unchanged(state["settings"], trainer.settings.to_config(), checkpoint.step)
+    state["learner"]["q_network"] = state.pop("q_network")
+    state["memory"]["frames"]["sealed"] = checkpoint.blocks
+    problem = trainer.load_state_dict(state)
+    return state["run"]["metrics_length"], state["run"]["seconds"], problem
 
 
 def _given_weights(trainer: Trainer) -> dict[str, Any]:

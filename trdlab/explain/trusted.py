@@ -1,0 +1,81 @@
+"""How far into the future a forecast can be trusted: one figure, by a stated rule."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trdlab.arrays import BoolArray
+from trdlab.decomposition import TimeAxis
+from trdlab.explain.calibration import Calibration
+
+
+@dataclass(frozen=True)
+class Trust:
+    """How far a forecast can be trusted.
+
+    A component is trusted if the lower end of its skill interval is above zero. So is one with
+    nothing to predict, unless its forecast is wrong by more (in mean square, undiscounted) than a
+    constant guess is at the steps where there is something to predict. The forecast can be trusted
+    as far as all components up to there are trusted.
+
+    Args:
+        time_axis: what the components mean.
+        components: how many explicit components in a row, from the first on, are trusted.
+        at_most: how many could be, for all that the intervals say: up to the first whose upper end
+            is not above zero, or that is wrong with nothing to predict.
+        tested: how many of the trusted ones had something to predict.
+        residual: whether the residual is trusted, by the same rule.
+    """
+
+    time_axis: TimeAxis
+    components: int
+    at_most: int
+    tested: int
+    residual: bool
+
+    @property
+    def last_step(self) -> int | None:
+        """The k of `trustworthy to t+k`; None where nothing is, or nothing was tested."""
+        return self.components * self.time_axis.width - 1 if self.tested else None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all explicit components are trusted."""
+        return self.components == self.time_axis.horizon > 0 and self.tested > 0
+
+
+def trust(calibration: Calibration) -> Trust:
+    """Returns how far a calibrated forecast can be trusted."""
+    axis, sure = calibration.time_axis, trusted(calibration)
+    wrong = np.where(
+        calibration.is_("nothing to predict"),
+        _is_wrong(calibration),
+        calibration.skill.high <= 0.0,  # NaN, so not wrong, where there is no interval
+    )
+    components = _leading(sure[:-1])
+    return Trust(
+        time_axis=axis,
+        components=components,
+        at_most=_leading(~wrong[:-1]),
+        tested=int(calibration.is_("judged")[:components].sum()),
+        residual=bool(sure[-1]),
+    )
+
+
+def trusted(calibration: Calibration) -> BoolArray:
+    """Returns `[N+1]`: the components that are trusted, each by itself."""
+    nothing = calibration.is_("nothing to predict") & ~_is_wrong(calibration)
+    return nothing | (calibration.skill.low > 0.0)  # NaN, so false, where there is no interval
+
+
+def _is_wrong(calibration: Calibration) -> BoolArray:
+    """Returns `[N+1]`: where the error is larger than that of a constant guess elsewhere."""
+    scale = np.maximum(calibration.time_axis.discounts, np.finfo(np.float64).tiny) ** 2
+    guess = (calibration.variance / scale)[calibration.is_("judged")]
+    usual = float(guess.mean()) if guess.size else 0.0
+    return np.asarray(calibration.error.value / scale > usual + 1e-12)
+
+
+def _leading(flags: BoolArray) -> int:
+    """Returns how many flags in a row are true, from the first on."""
+    return int(np.append(flags, False).argmin())

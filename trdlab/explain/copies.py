@@ -1,0 +1,171 @@
+"""Environments whose states can be copied, to see what else could have followed."""
+
+from collections.abc import Mapping
+from copy import copy, deepcopy
+from typing import Any, Protocol, Self
+
+import gymnasium as gym
+import numpy as np
+
+from trdlab.arrays import FloatArray, IntArray
+from trdlab.environments import Environments, Padding, Step
+from trdlab.environments.gym import GymEnvironments
+from trdlab.environments.history import Histories, checked_actions
+from trdlab.errors import InputError
+from trdlab.tabular import MDP
+
+
+class CopyableEnvironments(Environments, Protocol):
+    """Environments of which copies can be made, in the middle of their episodes."""
+
+    def branch(self, which: IntArray, seed: int) -> "CopyableEnvironments":
+        """Returns copies that go on from where these are, each by a chance of its own.
+
+        Args:
+            which: `[B′]`, the number of the environment that each copy is made of.
+            seed: of the chance from here on.
+        """
+        ...
+
+
+class ModelEnvironments:
+    """B episodes drawn from an exact model; the observations are state indices.
+
+    Args:
+        mdp: the model.
+        num_envs: B.
+        seed: where all chance comes from.
+        starts: `[S]`, how likely episodes begin in each state; without it in `mdp.start`.
+        time_limit: the steps after which an episode is truncated.
+        action_names: A names, if the actions have some.
+
+    Raises:
+        InputError: there is no environment, or the starts are no distribution over the states.
+
+    >>> coin = MDP.from_transitions([[[(1.0, 0, 1.0, True)], [(1.0, 0, 0.0, False)]]])
+    >>> environments = ModelEnvironments(coin, 2, seed=0)
+    >>> environments.reset().tolist(), environments.step(np.array([0, 1])).terminated.tolist()
+    ([0, 0], [True, False])
+    """
+
+    first_action = 0
+    stack: int | None = None
+    padding: Padding = "reset"
+    frame_skip = 1
+    frames_per_second: float | None = None
+
+    def __init__(
+        self,
+        mdp: MDP,
+        num_envs: int,
+        *,
+        seed: int,
+        starts: FloatArray | None = None,
+        time_limit: int | None = None,
+        action_names: tuple[str, ...] = (),
+    ) -> None:
+        if num_envs < 1:
+            raise InputError(f"There are {num_envs} environments.", "Make at least 1.")
+        begin = np.eye(mdp.num_states)[mdp.start] if starts is None else np.asarray(starts)
+        if begin.shape != (mdp.num_states,) or begin.min() < 0.0 or abs(begin.sum() - 1) > 1e-9:
+            raise InputError(
+                "The starts are no distribution over the states.",
+                f"Give {mdp.num_states} probabilities that sum to 1.",
+            )
+        self.mdp, self.num_envs, self.num_actions = mdp, num_envs, mdp.num_actions
+        self.observation_space = gym.spaces.Discrete(mdp.num_states)
+        self.action_names, self.time_limit = action_names, time_limit
+        self._rng, self._begin = np.random.default_rng(seed), np.cumsum(begin)
+        self._cumulative = np.cumsum(mdp.probabilities)  # [K], over all rows
+        self._before = np.concatenate([[0.0], self._cumulative])[mdp.offsets]  # [S·A + 1]
+        self._states = np.zeros(num_envs, dtype=np.int64)
+        self._elapsed = np.zeros(num_envs, dtype=np.int64)
+
+    def reset(self) -> IntArray:
+        """Begins every episode, and returns their first states `[B]`."""
+        self._states, self._elapsed = self._first(self.num_envs), np.zeros_like(self._elapsed)
+        return self._states.copy()
+
+    def step(self, actions: IntArray) -> Step:
+        """Takes actions `[B]`; where an episode ends, the next one begins in the same call.
+
+        Raises:
+            InputError: there are not B actions, or one does not exist.
+        """
+        actions = checked_actions(actions, self.num_envs, self.num_actions)
+        drawn = self._drawn(self._states * self.num_actions + actions)  # [B], transitions
+        frames, terminated = self.mdp.next_states[drawn], self.mdp.terminated[drawn]
+        self._elapsed += 1
+        late = self._elapsed == (self.time_limit or -1)
+        ended = terminated | late
+        self._states = frames.copy()
+        self._states[ended] = self._first(int(ended.sum()))
+        self._elapsed[ended] = 0
+        return Step(
+            frames=frames,
+            rewards=self.mdp.rewards[drawn],
+            terminated=terminated,
+            truncated=late & ~terminated,
+            life_lost=np.zeros(self.num_envs, dtype=np.bool_),
+            following=self._states.copy(),
+        )
+
+    def branch(self, which: IntArray, seed: int) -> Self:
+        """Returns copies of the environments `which [B′]`, each with a chance of its own."""
+        other = copy(self)
+        other.num_envs, other._rng = len(which), np.random.default_rng(seed)
+        other._states, other._elapsed = self._states[which], self._elapsed[which]
+        return other
+
+    def state_dict(self) -> dict[str, Any]:
+        """Returns the states of the episodes and of chance."""
+        chance = self._rng.bit_generator.state
+        return {"states": self._states.copy(), "elapsed": self._elapsed.copy(), "chance": chance}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> IntArray:
+        """Restores to the bit; returns `[B]`, the states the next actions are chosen in."""
+        self._states, self._elapsed = state["states"].copy(), state["elapsed"].copy()
+        self._rng.bit_generator.state = state["chance"]
+        return self._states.copy()
+
+    def close(self) -> None:
+        """There is nothing to let go of."""
+
+    def _first(self, count: int) -> IntArray:
+        level = self._rng.random(count) * self._begin[-1]
+        return np.asarray(np.searchsorted(self._begin, level, side="right"))
+
+    def _drawn(self, rows: IntArray) -> IntArray:
+        """Returns `[B]`: a transition of each row of the model, by their probabilities."""
+        low, high = self._before[rows], self._before[rows + 1]
+        level = low + self._rng.random(len(rows)) * (high - low)
+        drawn = np.searchsorted(self._cumulative, level, side="right")
+        first, last = self.mdp.offsets[rows], self.mdp.offsets[rows + 1] - 1
+        return np.asarray(np.clip(drawn, first, last))  # rounding must not lead into another row
+
+
+class CopyableGymEnvironments(GymEnvironments):
+    """Gymnasium environments that are copied whole, with fresh chance in each copy.
+
+    The copies take their chance from `np_random`, as Gymnasium asks of environments. One whose
+    chance comes from elsewhere makes copies that all do the same (see `Ceiling.deterministic`).
+    """
+
+    def branch(self, which: IntArray, seed: int) -> Self:
+        """Returns copies of the environments `which [B′]`; their `state_dict` cannot be asked for.
+
+        Raises:
+            InputError: an environment cannot be copied.
+        """
+        other, seeds = copy(self), np.random.SeedSequence(seed).spawn(len(which))
+        try:
+            envs = [deepcopy(self._envs[env]) for env in which]
+        except (TypeError, AttributeError, NotImplementedError, RuntimeError) as error:
+            raise InputError(
+                f"{self.env_id} cannot be copied ({error}).", "Ask for no ceiling and no foils."
+            ) from error
+        for env, words in zip(envs, seeds, strict=True):
+            env.unwrapped.np_random = np.random.default_rng(words)
+        other._envs, other.num_envs = envs, len(envs)
+        other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
+        return other

@@ -1,0 +1,128 @@
+"""Counterfactuals: what really follows an action and its foil, from copies of one state."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.decomposition import TimeAxis
+from trdlab.environments.stack import FrameStack
+from trdlab.errors import InputError
+from trdlab.estimator import Estimator
+from trdlab.explain.branches import Branches, Branching
+from trdlab.explain.copies import CopyableEnvironments
+from trdlab.explain.episodes import Policy, decide
+from trdlab.explain.intervals import LEVEL, RESAMPLES, Estimates, draws, percentiles
+
+
+@dataclass(frozen=True, eq=False)
+class Counterfactual:
+    """How the futures of two actions differ, as predicted and as they followed.
+
+    Args:
+        time_axis: what the components mean.
+        action: the number of one action.
+        foil: the number of the other.
+        copies: how often each was tried.
+        predicted: `[N+2]`, action − foil of every component, and of their sum.
+        observed: `[N+2]`, the same of the means of what followed; NaN where that is not known.
+            There is no interval where nothing varied, unless nothing did at any step: what happened
+            in none of some copies can still happen.
+    """
+
+    time_axis: TimeAxis
+    action: int
+    foil: int
+    copies: int
+    predicted: FloatArray
+    observed: Estimates
+
+
+def counterfactual(
+    branching: Branching,
+    environments: CopyableEnvironments,
+    stack: FrameStack,
+    action: int,
+    foil: int,
+    *,
+    age: int = 0,
+    seed: int = 0,
+    level: float = LEVEL,
+    resamples: int = RESAMPLES,
+) -> Counterfactual:
+    """Tries two actions, each from copies of the same state, and follows the policy after them.
+
+    Args:
+        branching: the estimator, and how many copies to make.
+        environments: where the state is: that of the first of them.
+        stack: what the agent sees there.
+        action: the number of one action.
+        foil: the number of the other.
+        age: the steps since the episode began.
+        seed: of the copies and of the bootstrap.
+        level: the probability that the intervals are made for.
+        resamples: how many samples of copies are drawn.
+
+    Raises:
+        InputError: there is no such action, or both are the same.
+    """
+    if action == foil:
+        raise InputError(f"Action and foil are both {action}.", "Give two different actions.")
+    seeds = np.random.SeedSequence(seed).generate_state(2).tolist()
+    tried = [
+        branching.at(environments, stack, first, age=age, seed=own)
+        for first, own in zip((action, foil), seeds, strict=True)
+    ]
+    rng = np.random.default_rng(seed)
+    futures = [_futures(branches) for branches in tried]  # 2 of [n, N+2]
+    one, other = (draws(len(of), resamples, rng) @ of / len(of) for of in futures)
+    varies = np.max([np.ptp(of, axis=0) > 0.0 for of in futures], axis=0)  # [N+2]
+    found = percentiles(one - other, level, branching.copies > 1)
+    predicted = tried[0].predicted[0] - tried[1].predicted[0]
+    return Counterfactual(
+        time_axis=branching.estimator.time_axis,
+        action=action,
+        foil=foil,
+        copies=branching.copies,
+        predicted=np.append(predicted, predicted.sum()),
+        observed=found.where(np.True_, varies | ~varies.any()),
+    )
+
+
+def play_to(
+    estimator: Estimator,
+    environments: CopyableEnvironments,
+    steps: int,
+    *,
+    policy: Policy | None = None,
+    seed: int = 0,
+) -> FrameStack:
+    """Plays the first environment for some steps, and returns what the agent then sees.
+
+    Args:
+        estimator: whose policy is followed.
+        environments: they are reset.
+        steps: how many steps to take.
+        policy: what the estimator describes, where that is not its own greedy policy.
+        seed: of the policy's draws.
+
+    Raises:
+        InputError: the episode is over by then.
+    """
+    rng = np.random.default_rng(seed)
+    stack = FrameStack(environments.reset(), environments.stack, environments.padding)
+    for taken in range(steps):
+        step = environments.step(decide(estimator, stack.observations, policy).draw(rng))
+        if step.ended[0]:
+            raise InputError(
+                f"There is no step {steps}: the episode is over after {taken + 1} steps.",
+                f"Choose a step from 0 to {taken}.",
+            )
+        stack.push(step.following, step.ended)
+    return stack
+
+
+def _futures(branches: Branches) -> FloatArray:
+    """Returns `[n, N+2]`: every component of what followed, and their sum; NaN if not known."""
+    observed = np.where(branches.known[0], branches.observed[0], np.nan)  # [n, N+1]
+    return np.column_stack([observed, observed.sum(axis=1)])

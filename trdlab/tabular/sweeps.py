@@ -1,91 +1,98 @@
 """Values of large models: modified policy iteration over blocks of neighbouring states.
 
 Three things make it quick. States are ordered by their distance from reward, so that a block is
-fed by the blocks before it, and fits into the cache. The first policy heads for the nearest reward.
-And a block rests while nothing that it reads changes, so that work is done only where values still
-move. Evaluating the chosen actions takes a product of S rows, and is repeated until it pays to look
-at all S·A rows again. See Puterman and Shin (1978) for modified policy iteration, and Wingate and
-Seppi (2005) for prioritised blocks.
+fed by the blocks before it, and fits into the cache; and their first values are those of heading
+there. A block rests while nothing that it reads changes, so that work is done only where values
+still move. And evaluating the chosen actions takes a product of S rows, repeated until it pays to
+look at all S·A rows again; once no action changes any more, until the end. See Puterman and Shin
+(1978) for modified policy iteration, and Wingate and Seppi (2005) for prioritised blocks.
 """
 
-from dataclasses import dataclass, field
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.errors import InputError
+from trdlab.arrays import FloatArray, IntArray
+from trdlab.errors import InputError, TrdlabError
 from trdlab.tabular.mdp import MDP
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 BLOCK = 16_384
-_BURST = 3  # sweeps over a block between two looks at how much it changes, if there are others
-_ALONE_BURST = 8  # if it is the only one
+_BURST, _EVALUATE_TO = 3, 0.1
+# sweeps over a block between two looks at how much it changes, and the part of the last
+# improvement's change to leave, if there are several blocks
+_ALONE_BURST, _ALONE_EVALUATE_TO = 8, 1.0  # if there is only one: calls take most of the time
 _MAX_BURSTS = 16  # before all actions are compared again
-_EVALUATE_TO = 0.1  # of the last improvement's change
 _MAX_ROUNDS = 100_000
 _UNIT = float(np.finfo(np.float64).eps)
 
 
-@dataclass
 class _Block:
-    """The states `low … high−1` of the new order: all their actions, and the chosen ones."""
+    """The states of `span` in the new order: all their actions, and the chosen ones.
 
-    low: int
-    high: int
-    matrix: "csr_array"  # [A·b, S], γ·C, action by action
-    rewards: FloatArray  # [A, b]
-    actions: IntArray  # [b]
-    chain: "csr_array" = field(init=False)  # [b, S], the rows of the chosen actions
-    gains: FloatArray = field(init=False)  # [b], their rewards
+    Args:
+        span: which states, b of them.
+        matrix: `[b·A, S]`, γ·C.
+        rewards: `[b·A]`.
+    """
 
-    def __post_init__(self) -> None:
-        self.choose(self.actions)
+    def __init__(self, span: slice, matrix: "csr_array", rewards: FloatArray) -> None:
+        self.span, self.matrix, self.rewards = span, matrix, rewards
+        size, lengths = span.stop - span.start, np.diff(matrix.indptr)
+        self._first_rows = np.arange(0, len(rewards), len(rewards) // size)  # [b], of each state
+        self._length = int(lengths[0]) if (lengths == lengths[0]).all() else None
+        self._rows = np.full(size, -1)  # [b], of the chosen actions: none yet
+        self._gains: FloatArray = rewards[:0]  # [b], their rewards
+        self._chain = matrix  # [b, S], those rows themselves
 
-    def choose(self, actions: IntArray) -> None:
-        """Takes over a policy."""
-        size = self.high - self.low
-        states = np.arange(size)
-        self.actions = actions
-        self.chain = self.matrix[actions * size + states]
-        self.gains = self.rewards[actions, states]
+    def improve(self, values: FloatArray) -> tuple[float, bool]:
+        """Applies the Bellman operator in place, and chooses the best actions.
 
-    def improve(self, values: FloatArray) -> float:
-        """Applies the Bellman operator in place; returns the largest change."""
-        best, actions = self.best(values)
-        if not np.array_equal(actions, self.actions):
-            self.choose(actions)
-        return self._replace(values, best)
-
-    def best(self, values: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Returns the best Q-value `[b]` of each state, and its action: the first of equals."""
-        q_values = (self.matrix @ values).reshape(self.rewards.shape)
+        Returns:
+            The largest change, and whether an action changed.
+        """
+        q_values = self.matrix @ values
         q_values += self.rewards
-        best, actions = q_values[0], np.zeros(self.high - self.low, dtype=np.int64)
-        for action in range(1, len(q_values)):  # much quicker than argmax over a short axis
-            better = q_values[action] > best
-            np.copyto(best, q_values[action], where=better)
-            np.copyto(actions, action, where=better)
-        return best, actions
+        rows = q_values.reshape(len(self._rows), -1).argmax(axis=1)  # the first of equals
+        rows += self._first_rows
+        changed = np.flatnonzero(rows != self._rows)
+        if len(changed):
+            self._choose(rows, changed)
+        return self._replace(values, q_values[rows]), len(changed) > 0
 
     def evaluate(self, values: FloatArray, sweeps: int) -> float:
         """Applies the chosen actions' operator some times; returns the last largest change."""
+        own = values[self.span]
         for _ in range(sweeps - 1):
-            values[self.low : self.high] = self.chain @ values + self.gains
-        return self._replace(values, self.chain @ values + self.gains)
+            np.add(self._chain @ values, self._gains, out=own)
+        return self._replace(values, self._chain @ values + self._gains)
+
+    def _choose(self, rows: IntArray, changed: IntArray) -> None:
+        """Takes over the `rows [b]`, of which those of the states `changed` are new."""
+        begins = self._rows[0] < 0
+        self._rows, self._gains = rows, self.rewards[rows]
+        if begins or self._length is None:
+            self._chain = self.matrix[rows]
+            return
+        for name in ("indices", "data"):  # new rows are as long as old ones, and take their places
+            old = getattr(self._chain, name).reshape(-1, self._length)
+            new = getattr(self.matrix, name).reshape(-1, self._length)
+            old[changed] = new[rows[changed]]
 
     def _replace(self, values: FloatArray, new: FloatArray) -> float:
-        change = float(np.abs(new - values[self.low : self.high]).max())
-        values[self.low : self.high] = new
+        own = values[self.span]
+        change = float(np.abs(new - own).max())
+        own[:] = new
         return change
 
 
 def optimal_values(mdp: MDP, gamma: float, tolerance: float) -> tuple[FloatArray, float]:
     """Returns the optimal values `[S]` and how far they can be from the exact ones (proven).
 
-    With T the Bellman operator, ‖T v − v*‖ ≤ γ/(1 − γ)·‖T v − v‖: the values returned are T v.
+    With T the Bellman operator, ‖T v − v*‖ ≤ γ/(1 − γ)·‖T v − v‖.
 
     Args:
         mdp: the model.
@@ -95,8 +102,8 @@ def optimal_values(mdp: MDP, gamma: float, tolerance: float) -> tuple[FloatArray
     Raises:
         InputError: the tolerance is finer than rounding allows.
     """
-    order, actions = _toward_reward(mdp)
-    return _solved(mdp, gamma, tolerance, order, actions, np.zeros(mdp.num_states))
+    order, ahead, chance = _toward_reward(mdp)
+    return _solved(mdp, gamma, tolerance, order, _guess(mdp, gamma, ahead, chance))
 
 
 def policy_values(
@@ -114,7 +121,7 @@ def policy_values(
     Raises:
         InputError: the tolerance is finer than rounding allows.
     """
-    order, _ = _toward_reward(mdp)
+    order, _, _ = _toward_reward(mdp)
     weights = policy[mdp.transition_states, mdp.transition_actions] * mdp.probabilities
     followed = MDP(
         offsets=mdp.offsets[:: mdp.num_actions],
@@ -125,8 +132,7 @@ def policy_values(
         num_actions=1,
         start=mdp.start,
     )
-    only = np.zeros(mdp.num_states, dtype=np.int64)
-    return _solved(followed, gamma, tolerance, order, only, start)
+    return _solved(followed, gamma, tolerance, order, start)
 
 
 def least_tolerance(mdp: MDP, gamma: float) -> float:
@@ -135,123 +141,155 @@ def least_tolerance(mdp: MDP, gamma: float) -> float:
 
 
 def _solved(
-    mdp: MDP,
-    gamma: float,
-    tolerance: float,
-    order: IntArray,
-    actions: IntArray,
-    start: FloatArray,
+    mdp: MDP, gamma: float, tolerance: float, order: IntArray, start: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Iterates until the bound is proven; `order` and `actions` say where and how to begin."""
-    blocks, reads = _blocks(mdp, gamma, order, actions)
-    values = start[order]
-    rounding = least_tolerance(mdp, gamma)
-    allowed = 0.5 * tolerance * (1.0 - gamma)
-    for _ in range(20):
-        _iterate(blocks, reads, values, allowed)
-        largest = max(float(np.abs(b.rewards).max()) for b in blocks) + float(np.abs(values).max())
-        before = values.copy()
-        change = max([_applied(block, before, values) for block in blocks])
-        bound = gamma * change / (1.0 - gamma) + rounding * largest
-        if bound <= tolerance:
-            result = np.empty_like(values)
-            result[order] = values
-            return result, bound
-        allowed /= 4.0
-    raise InputError(
-        f"An error of {tolerance:.0e} is finer than rounding allows: {bound:.0e} was reached.",
-        "Allow a larger error, or choose a smaller gamma.",
+    """Improves and evaluates until the bound is proven; `order` and `start` say how to begin.
+
+    A pass over all blocks that changes nothing by more than δ proves γ·δ/(1 − γ): block by block
+    it applied T to values at most δ from those that it left, so T changes these by γ·δ at most.
+    """
+    order = order if mdp.num_states > BLOCK else np.arange(mdp.num_states)
+    blocks, readers = _blocks(mdp, gamma, order)
+    values, dirty = start[order], set(range(len(blocks)))
+    rounding, paid = least_tolerance(mdp, gamma), float(np.abs(mdp.expected_rewards).max())
+    part = _ALONE_EVALUATE_TO if len(blocks) == 1 else _EVALUATE_TO
+    for _ in range(_MAX_ROUNDS):
+        changes, settled = _improve(blocks, values, dirty)
+        unsure = rounding * (paid + float(np.abs(values).max()))
+        allowed = max(tolerance - 2.0 * unsure, unsure) * (1.0 - gamma)
+        moved = {b for b, change in changes.items() if change > allowed}
+        if moved:
+            target = allowed if settled else max(part * max(changes.values()), allowed)
+            moved |= _evaluate(blocks, readers, values, moved, target, allowed)
+            dirty = set().union(*(readers[b] for b in moved))
+        elif len(dirty) < len(blocks):
+            dirty = set(range(len(blocks)))
+        else:
+            bound = gamma * max(changes.values()) / (1.0 - gamma) + unsure
+            return _placed(values, order), _checked(bound, tolerance)
+    raise TrdlabError(
+        f"The values did not settle in {_MAX_ROUNDS} rounds.", "Choose a smaller gamma."
     )
 
 
-def _applied(block: _Block, before: FloatArray, after: FloatArray) -> float:
-    """Applies the Bellman operator to all of `before`; returns the largest change."""
-    span = slice(block.low, block.high)
-    after[span] = block.best(before)[0]
-    return float(np.abs(after[span] - before[span]).max())
+def _placed(values: FloatArray, order: IntArray) -> FloatArray:
+    """Puts the values of an order into that of the model."""
+    placed = np.empty_like(values)
+    placed[order] = values
+    return placed
 
 
-def _iterate(blocks: list[_Block], reads: BoolArray, values: FloatArray, allowed: float) -> None:
-    """Improves and evaluates, in place, until no block changes by more than `allowed`."""
-    dirty = np.ones(len(blocks), dtype=np.bool_)
-    _evaluate(blocks, reads, values, dirty, target=1e-2 * max(1.0, float(np.abs(values).max())))
-    for _ in range(_MAX_ROUNDS):
-        changes = np.zeros(len(blocks))
-        for b in np.flatnonzero(dirty):
-            changes[b] = blocks[b].improve(values)
-        moved = changes > allowed
-        if not moved.any():
-            return
-        target = max(_EVALUATE_TO * float(changes.max()), 0.3 * allowed)
-        moved |= _evaluate(blocks, reads, values, moved, target) > allowed
-        dirty = reads[:, moved].any(axis=1) | moved
+def _checked(bound: float, tolerance: float) -> float:
+    if bound > tolerance:
+        raise InputError(
+            f"An error of {tolerance:.0e} is finer than rounding allows: {bound:.0e} was reached.",
+            "Allow a larger error, or choose a smaller gamma.",
+        )
+    return bound
+
+
+def _improve(
+    blocks: list[_Block], values: FloatArray, todo: set[int]
+) -> tuple[dict[int, float], bool]:
+    """Improves blocks, in place; returns their largest changes, and whether all actions stayed."""
+    changes, settled = {}, True
+    for b in sorted(todo):
+        changes[b], other = blocks[b].improve(values)
+        settled = settled and not other
+    return changes, settled
 
 
 def _evaluate(
-    blocks: list[_Block], reads: BoolArray, values: FloatArray, todo: BoolArray, target: float
-) -> FloatArray:
-    """Evaluates blocks, and those that read them, until they change little; returns the most."""
-    most = np.zeros(len(blocks))
+    blocks: list[_Block],
+    readers: list[set[int]],
+    values: FloatArray,
+    todo: set[int],
+    target: float,
+    allowed: float,
+) -> set[int]:
+    """Evaluates blocks, and those that read them, until none changes by more than the target.
+
+    Returns:
+        The blocks that changed by more than `allowed`.
+    """
+    moved: set[int] = set()
     sweeps = _ALONE_BURST if len(blocks) == 1 else _BURST
     for _ in range(_MAX_BURSTS):
-        active = np.zeros_like(todo)
-        for b in np.flatnonzero(todo):
+        active: set[int] = set()
+        for b in sorted(todo):
             change = blocks[b].evaluate(values, sweeps)
-            most[b] = max(most[b], change)
+            if change > allowed:
+                moved.add(b)
             if change > target:
-                active |= reads[:, b]
-                active[b] = True
+                active |= readers[b]
         todo = active
-        if not todo.any():
+        if not todo:
             break
-    return most
+    return moved
 
 
-def _blocks(
-    mdp: MDP, gamma: float, order: IntArray, actions: IntArray
-) -> tuple[list[_Block], BoolArray]:
-    """Returns the blocks of the new order, and `reads [b, c]`: whether b's rows look at c."""
+def _blocks(mdp: MDP, gamma: float, order: IntArray) -> tuple[list[_Block], list[set[int]]]:
+    """Returns the blocks of the new order, and of each those that read it, itself among them."""
     from scipy.sparse import csr_array
 
-    num_states, num_actions = mdp.num_states, mdp.num_actions
-    place = np.empty(num_states, dtype=np.int32)
-    place[order] = np.arange(num_states, dtype=np.int32)
-    blocks, count = [], -(-num_states // BLOCK)
-    reads = np.zeros((count, count), dtype=np.bool_)
-    for b in range(count):
-        low, high = b * BLOCK, min((b + 1) * BLOCK, num_states)
-        states = order[low:high]
-        rows = mdp.matrix[(states * num_actions + np.arange(num_actions)[:, None]).ravel()]
+    size, num_actions = mdp.num_states, mdp.num_actions
+    if size <= BLOCK:
+        rewards, whole = mdp.expected_rewards.ravel(), mdp.matrix
+        matrix = csr_array((gamma * whole.data, whole.indices, whole.indptr), whole.shape)
+        return [_Block(slice(0, size), matrix, rewards)], [{0}]
+    place = np.empty(size, dtype=np.int32)
+    place[order] = np.arange(size, dtype=np.int32)
+    blocks: list[_Block] = []
+    readers: list[set[int]] = [{b} for b in range(-(-size // BLOCK))]
+    for b in range(len(readers)):
+        span = slice(b * BLOCK, min((b + 1) * BLOCK, size))
+        states = order[span]
+        rows = mdp.matrix[(states[:, None] * num_actions + np.arange(num_actions)).ravel()]
         columns = place[rows.indices]
-        part = csr_array((gamma * rows.data, columns, rows.indptr), rows.shape)
-        rewards = np.ascontiguousarray(mdp.expected_rewards[states].T)
-        blocks.append(_Block(low, high, part, rewards, actions[states]))
-        reads[b, np.flatnonzero(np.bincount(columns // BLOCK))] = True
-    return blocks, reads
+        matrix = csr_array((gamma * rows.data, columns, rows.indptr), rows.shape)
+        blocks.append(_Block(span, matrix, mdp.expected_rewards[states].ravel()))
+        for read in np.flatnonzero(np.bincount(columns // BLOCK)):
+            readers[read].add(b)
+    return blocks, readers
 
 
-def _toward_reward(mdp: MDP) -> tuple[IntArray, IntArray]:
-    """Returns the states `[S]` by their distance from reward, and actions that lead there.
+def _toward_reward(mdp: MDP) -> tuple[IntArray, IntArray, FloatArray]:
+    """Finds the shortest way to reward: to where something positive is paid, or else to an end.
 
-    Reward is where something positive is paid; if nothing is, where the episode ends.
+    Returns:
+        The states `[S]` by their distance; each one's next state `[S]` on the way, S where the way
+        ends and negative where there is none; and the chance `[S]` of the likeliest step there.
     """
-    from scipy.sparse import csr_array
+    from scipy.sparse import csc_array
     from scipy.sparse.csgraph import breadth_first_order
 
-    size, possible = mdp.num_states, mdp.continuation > 0.0
+    size, states, targets = mdp.num_states, mdp.transition_states, mdp.matrix.indices.copy()
+    over = np.flatnonzero(mdp.continuation == 0.0)
+    targets[over] = states[over]
     goal = (mdp.rewards > 0.0) & (mdp.probabilities > 0.0)
-    goal = goal if goal.any() else mdp.terminated
-    last = np.flatnonzero(mdp.per_state(goal.astype(np.float64)) > 0.0)
-    sources = np.concatenate([mdp.next_states[possible], np.full(len(last), size)])
-    targets = np.concatenate([mdp.transition_states[possible], last])
-    backward = csr_array(
-        (np.ones(len(sources), dtype=np.int8), (sources, targets)), (size + 1, size + 1)
-    )
-    found, toward = breadth_first_order(backward, size, directed=True)
-    unreached = np.ones(size + 1, dtype=np.bool_)
-    unreached[found] = False
-    order = np.concatenate([found[1:], np.flatnonzero(unreached)]).astype(np.int64)
-    heads = mdp.continuation * (mdp.next_states == toward[mdp.transition_states])
-    score = mdp.per_action(heads)
-    score[last] = mdp.expected_rewards[last]
-    return order, score.argmax(axis=1)
+    targets[goal if goal.any() else mdp.terminated] = size
+    ends = np.append(mdp.offsets[:: mdp.num_actions], len(targets)).astype(targets.dtype)
+    backward = csc_array((mdp.probabilities, targets, ends), (size + 1, size + 1))
+    found, ahead = breadth_first_order(backward, size)
+    order = np.concatenate([found[1:], np.flatnonzero(ahead[:size] < 0)])
+    steps = mdp.probabilities * (targets == ahead[states])  # [K]
+    chance = np.maximum.reduceat(steps, mdp.offsets[: -1 : mdp.num_actions])
+    return order, ahead[:size].astype(np.int64), chance
+
+
+def _guess(mdp: MDP, gamma: float, ahead: IntArray, chance: FloatArray) -> FloatArray:
+    """Returns the values `[S]` of heading for reward, if all else that happens led nowhere.
+
+    To get ahead with chance p, or else to stay, gives v = (r + γ·p·v(ahead)) / (1 − γ·(1 − p)).
+    """
+    lasting = 1.0 - gamma * (1.0 - chance)
+    reward = reduce(np.maximum, mdp.expected_rewards.T)  # quicker than along a short axis
+    values = np.asarray(reward / lasting)
+    within = (ahead >= 0) & (ahead < mdp.num_states)
+    share = np.where(within, gamma * chance, 0.0) / lasting
+    way = np.where(within, ahead, 0)
+    while share.any():  # look twice as far each time
+        values += share * values[way]
+        share *= share[way]
+        way = way[way]
+    return values

@@ -226,3 +226,14 @@ def test_the_model_travels_with_the_environment():
     assert env.get_wrapper_attr("action_names") == ("up", "down", "left", "right")
     assert env.get_wrapper_attr("mdp") is env.unwrapped.world.mdp
     assert env.unwrapped.world.grid == load_map("windy")
+
+
+def test_exploring_starts_begin_anywhere_where_something_can_happen():
+    env = GridworldEnv("drone", exploring_starts=True)
+    env.reset(seed=0)
+    counts = np.bincount([env.reset()[0] for _ in range(6000)], minlength=env.mdp.num_states)
+    begun = counts > 0
+    assert begun.sum() == 12
+    assert not (begun & env.mdp.terminal_states).any()
+    assert counts[begun] == pytest.approx(500, abs=5 * 500**0.5)
+    assert [GridworldEnv("drone").reset(seed=i)[0] for i in range(3)] == [env.mdp.start] * 3

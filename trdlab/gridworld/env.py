@@ -12,6 +12,7 @@ from trdlab.gridworld.gridmap import ACTIONS, GridMap, load_map
 from trdlab.gridworld.pixels import SIDE, pictures_of
 from trdlab.gridworld.world import Gridworld
 from trdlab.tabular.mdp import MDP
+from trdlab.tabular.reach import reachable
 
 Observed = Literal["index", "pixels"]
 Observation = np.int64 | npt.NDArray[np.uint8]
@@ -33,6 +34,9 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
         slip: the probability of moving sideways instead, in place of the map's own.
         treasure: what every treasure pays, in place of the map's own value.
         observation: `index` or `pixels`.
+        exploring_starts: whether episodes begin in any state that can be reached and in which
+            they are not over, each as likely, rather than at the map's start: so that rare states
+            are seen as often as others (Sutton and Barto, section 5.3).
         render_mode: `rgb_array` for pictures, `ansi` for text.
         cell_pixels: the side of a cell in the pictures.
 
@@ -57,6 +61,7 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
         slip: float | None = None,
         treasure: float | None = None,
         observation: Observed = "index",
+        exploring_starts: bool = False,
         render_mode: str | None = None,
         cell_pixels: int = 64,
     ) -> None:
@@ -80,6 +85,8 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
             else gym.spaces.Box(0, 255, (SIDE, SIDE), np.uint8)
         )
         self.action_space = gym.spaces.Discrete(self.mdp.num_actions)
+        self._starts = np.flatnonzero(reachable(self.mdp) & ~self.mdp.terminal_states)
+        self.exploring_starts = exploring_starts
         self.render_mode = render_mode
         self.cell_pixels = cell_pixels
         self._state: int | None = None  # None before the first reset
@@ -93,13 +100,15 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begins an episode at the start, or in `options["state"]`: an index, or `"row,column"`.
+        """Begins an episode; in `options["state"]`, if given: an index, or `"row,column"`.
 
         Raises:
             InputError: there is no such state, or the episode is already over in it.
         """
         super().reset(seed=seed)
         state = self.mdp.start
+        if self.exploring_starts:
+            state = int(self._starts[self.np_random.integers(len(self._starts))])
         if options is not None and "state" in options:
             state = self.world.find_state(str(options["state"]))
             if self.world.is_terminal(state):

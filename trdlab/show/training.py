@@ -6,37 +6,44 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from trdlab.deep.settings import TrainSettings
+from trdlab.errors import InputError
 from trdlab.evaluation import Evaluation
+from trdlab.formatting import decimals_for
 from trdlab.runs import RunSummary, to_toml
 from trdlab.show.text import fit
-from trdlab.statistics import Estimate
 from trdlab.training.setup import Plan
 
 
 def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
     """Returns the resolved configuration, and the memory and time that it will take."""
+    config = fit(to_toml(plan.settings.to_config()), ascii_only=ascii_only)
     lines = [
-        to_toml(plan.settings.to_config()),
         memory_line(plan.memory, plan.available),
         f"Time: about {duration(plan.seconds)}, at {plan.steps_per_second:,.0f} agent steps a "
         f"second while learning (measured here, in a few seconds).",
         "Nothing was written: leave out --dry-run to train.",
     ]
-    return Text(fit("\n".join(lines), ascii_only=ascii_only))
+    # the configuration can be copied: none of its lines is broken
+    return Group(
+        Text(config, no_wrap=True, overflow="ignore"),
+        Text(fit("\n".join(lines), ascii_only=ascii_only)),
+    )
 
 
 def evaluation_page(evaluation: Evaluation, *, ascii_only: bool = False) -> RenderableType:
     """Returns what an agent reached: means with intervals, and how the episodes ended."""
     count, cut = len(evaluation.returns), int(evaluation.truncated.sum())
     table = Table(box=None, padding=(0, 3, 0, 0), show_header=False, pad_edge=False)
+    low, high = float(evaluation.returns.min()), float(evaluation.returns.max())
+    decimals = _decimals(low, high)
     for name, of in (
         ("mean return", evaluation.mean),
         ("interquartile mean", evaluation.interquartile_mean),
     ):
-        interval = f"95 % interval {_interval(of)}"
-        table.add_row(name, _number(of.value), fit(interval, ascii_only=ascii_only))
-    low, high = evaluation.returns.min(), evaluation.returns.max()
-    span = f"{_number(low)} … {_number(high)}"
+        interval = f"95 % interval {_span(of.low, of.high, decimals)}"
+        table.add_row(name, _number(of.value, decimals), fit(interval, ascii_only=ascii_only))
+    span = _span(low, high, decimals)
     table.add_row("least and most", fit(span, ascii_only=ascii_only), "")
     length = f"{evaluation.lengths.mean():,.1f} agent steps"
     table.add_row("mean length", length, f"{cut} of {count} were cut off" if cut else "")
@@ -53,27 +60,29 @@ def runs_table(runs: Sequence[RunSummary], *, ascii_only: bool = False) -> Rende
             column, justify="right" if column in ("N", "w", "steps", "score") else "left"
         )
     for run in runs:
-        if run.fault is not None:
-            row = [run.path.name, "", "", "", "", "", run.fault]
-        else:
-            config, score = run.config, run.metrics.get("score")
-            steps = max(run.step or 0, run.metrics.get("agent_steps", 0))
-            row = [
-                run.path.name,
-                str(config.get("env", "")),
-                str(config.get("N", "")),
-                str(config.get("w", "")),
-                f"{steps:,}",
-                "" if score is None else _number(score),
-                status(run),
-            ]
-        table.add_row(*(Text(fit(cell, ascii_only=ascii_only)) for cell in row))
+        cells = [fit(cell, ascii_only=ascii_only) for cell in _row(run)]
+        table.add_row(*map(Text, cells))
     return table
 
 
-def status(run: RunSummary) -> str:
+def _row(run: RunSummary) -> list[str]:
+    """Returns the cells of a run; of one that is torn, its name and what is wrong."""
+    name, fault = run.path.name, run.fault
+    try:
+        settings = None if fault else TrainSettings.from_config(run.config, "Its config.toml")
+    except InputError as error:
+        settings, fault = None, str(error)
+    if settings is None:
+        return [name, "", "", "", "", "", fault or ""]
+    score = run.metrics.get("score")
+    steps = max(run.step or 0, run.metrics.get("agent_steps", 0))
+    axis = [str(settings.horizon), str(settings.width)]
+    told = "" if score is None else _number(score, _decimals(score))
+    return [name, settings.env, *axis, f"{steps:,}", told, _status(run, settings.agent_steps)]
+
+
+def _status(run: RunSummary, total: int) -> str:
     """Returns how a run stands, in a few words."""
-    total = run.config.get("agent_steps", 0)
     if run.pid is not None:
         return f"training (process {run.pid})" if run.pid else "training"
     if run.step is None:
@@ -109,9 +118,14 @@ def _gigabytes(nbytes: float) -> str:
     return f"{nbytes / 1e9:.2f} GB" if nbytes >= 5e6 else f"{nbytes / 1e6:.2f} MB"
 
 
-def _interval(of: Estimate) -> str:
-    return f"{_number(of.low)} … {_number(of.high)}"
+def _decimals(*values: float) -> int:
+    """Returns the decimals of scores: those of CartPole need fewer than those of FrozenLake."""
+    return 1 if max(map(abs, values)) >= 10.0 else decimals_for(values)
 
 
-def _number(value: float) -> str:
-    return f"{value:,.1f}" if abs(value) < 1e6 else f"{value:.3e}"
+def _span(low: float, high: float, decimals: int) -> str:
+    return f"{_number(low, decimals)} … {_number(high, decimals)}"
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:,.{decimals}f}" if abs(value) < 1e6 else f"{value:.3e}"

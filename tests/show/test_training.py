@@ -1,0 +1,137 @@
+"""Runs on a terminal: what is shown is what is known, in 80 columns, with or without UTF-8."""
+
+import io
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console, RenderableType
+
+from trdlab.deep.settings import TrainSettings
+from trdlab.evaluation import Evaluation
+from trdlab.runs import RunSummary
+from trdlab.show.training import duration, evaluation_page, memory_line, plan_page, runs_table
+from trdlab.training.setup import Plan
+
+CART = TrainSettings("gym", "CartPole-v1", horizon=40)
+
+
+def text(page: RenderableType, width: int = 80) -> str:
+    console = Console(file=io.StringIO(), width=width, highlight=False)
+    console.print(page)
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert max(len(line) for line in shown.splitlines() if " = " not in line) <= width
+    return str(shown)
+
+
+def words(page: RenderableType, width: int = 80) -> str:
+    return " ".join(text(page, width).split())
+
+
+def test_a_plan_shows_a_configuration_that_can_be_used_and_what_it_takes():
+    settings = CART.changed({"weights": "/a" * 60, "hidden": [7] * 40})
+    plan = Plan(settings, 2_100_000_000, 24_000_000_000, 20_000, 123.4)
+    shown = text(plan_page(plan))
+    lines, _, rest = shown.partition("\n\n")
+    assert tomllib.loads(lines) == settings.to_config()
+    assert "Replay memory: up to 2.10 GB, of 24.00 GB that are free." in rest
+    assert "Time: about 5.6 hours, at 123 agent steps a second" in rest
+    assert "Nothing was written" in rest
+
+
+def test_memory_where_nobody_knows_what_is_free():
+    assert memory_line(4_260_000, None) == "Replay memory: up to 4.26 MB."
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [
+        (0.0, "1 second"),
+        (1.4, "1 second"),
+        (1.6, "2 seconds"),
+        (89.4, "89 seconds"),
+        (90, "1.5 minutes"),
+        (5400, "1.5 hours"),
+        (36 * 3600, "1.5 days"),
+    ],
+)
+def test_a_time_as_people_say_it(seconds, said):
+    assert duration(seconds) == said
+
+
+def evaluation(returns: list[float], epsilon: float = 0.0, cut: int = 0) -> Evaluation:
+    count = len(returns)
+    lengths = np.full(count, 1200)
+    return Evaluation(np.array(returns), lengths, np.arange(count) < cut, epsilon, 7)
+
+
+def test_an_evaluation_in_numbers():
+    result = evaluation([480.0, 500.0, 500.0, 500.0], cut=3)
+    shown = words(evaluation_page(result))
+    assert "4 episodes, greedy, seed 7; raw rewards, undiscounted" in shown
+    assert f"mean return 495.0 95 % interval {result.mean.low:.1f} … 500.0" in shown
+    assert "interquartile mean 500.0 95 % interval" in shown
+    assert "least and most 480.0 … 500.0" in shown
+    assert "mean length 1,200.0 agent steps 3 of 4 were cut off" in shown
+    assert "cut off" not in words(evaluation_page(evaluation([1.0])))
+    assert "greedy, 5.0% random actions," in words(evaluation_page(evaluation([1.0], 0.05)))
+
+
+@pytest.mark.parametrize(
+    ("returns", "mean"),
+    [
+        ([0.0, 1.0, 1.0, 1.0], "0.75"),
+        ([-21.0, -20.0], "-20.5"),
+        ([0.0, 0.0], "0.00"),
+        ([0.002, 0.004], "0.00300"),
+        ([2e6, 4e6], "3.000e+06"),
+        ([1500.0, 2500.25], "2,000.1"),
+    ],
+)
+def test_scores_large_and_small(returns, mean):
+    assert f"mean return {mean} " in words(evaluation_page(evaluation(returns)))
+
+
+def summary(name: str = "run", **known: Any) -> RunSummary:
+    return RunSummary(Path("runs") / name, **{"config": CART.to_config()} | known)
+
+
+@pytest.mark.parametrize(
+    ("known", "row"),
+    [
+        ({}, "run CartPole-v1 40 1 0 no checkpoint yet"),
+        ({"step": 100_000}, "run CartPole-v1 40 1 100,000 done"),
+        (
+            {"step": 20_000, "metrics": {"agent_steps": 21_000, "score": 0.25}},
+            "run CartPole-v1 40 1 21,000 0.25 stopped at 20,000 of 100,000",
+        ),
+        (
+            {"step": 20_000, "pid": 77, "metrics": {"agent_steps": 1, "score": 195.04}},
+            "run CartPole-v1 40 1 20,000 195.0 training (process 77)",
+        ),
+        ({"pid": 0}, "run CartPole-v1 40 1 0 training"),
+        ({"config": {}, "fault": "'x' is torn."}, "run 'x' is torn."),
+        ({"config": {"kind": "gym"}}, "run Its config.toml does not say 'env'. Add it."),
+        (
+            {"config": CART.to_config() | {"agent_steps": "many"}},
+            "run Its config.toml has agent_steps = 'many'. It must be a whole number.",
+        ),
+        ({"metrics": {"score": None, "agent_steps": 5}}, "run CartPole-v1 40 1 5 no checkpoint"),
+    ],
+)
+def test_how_a_run_stands(known, row):
+    assert row in words(runs_table([summary(**known)]), width=100)
+
+
+def test_names_are_not_markup_and_any_terminal_can_show_them():
+    shown = words(runs_table([summary("[red]…γ"), summary("b", fault="[/]")]))
+    assert "[red]…γ" in shown
+    assert "[/]" in shown
+    for page in (
+        runs_table([summary("[red]…γ"), summary("ü")], ascii_only=True),
+        evaluation_page(evaluation([1.0, 2.0]), ascii_only=True),
+        plan_page(Plan(CART.changed({"env_arg": ["map=ü…"]}), 1, None, 1, 1), ascii_only=True),
+    ):
+        assert text(page).isascii()

@@ -181,7 +181,8 @@ def _train(
         from trdlab.show.training import plan_page
 
         console, ascii_only = common.new_console()
-        console.print(plan_page(plan(settings), ascii_only=ascii_only))
+        page = plan_page(plan(settings), ascii_only=ascii_only)
+        console.print(page, soft_wrap=True)  # so that the configuration can be copied
         return
     _carry_on(lambda: begin(settings, out or default_path(settings)))
 

@@ -17,18 +17,14 @@ from trdlab.training.setup import Plan
 
 def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
     """Returns the resolved configuration, and the memory and time that it will take."""
-    config = fit(to_toml(plan.settings.to_config()), ascii_only=ascii_only)
     lines = [
+        to_toml(plan.settings.to_config()),
         memory_line(plan.memory, plan.available),
         f"Time: about {duration(plan.seconds)}, at {plan.steps_per_second:,.0f} agent steps a "
         f"second while learning (measured here, in a few seconds).",
         "Nothing was written: leave out --dry-run to train.",
     ]
-    # the configuration can be copied: none of its lines is broken
-    return Group(
-        Text(config, no_wrap=True, overflow="ignore"),
-        Text(fit("\n".join(lines), ascii_only=ascii_only)),
-    )
+    return Text(fit("\n".join(lines), ascii_only=ascii_only))
 
 
 def evaluation_page(evaluation: Evaluation, *, ascii_only: bool = False) -> RenderableType:

@@ -84,7 +84,7 @@ def test_a_run_has_a_name_of_its_own(tmp_path, monkeypatch):
     ],
 )
 def test_auto_is_resolved_and_what_is_seen_comes_back(env, arguments, threads, monkeypatch):
-    monkeypatch.setattr("os.cpu_count", lambda: 6)
+    monkeypatch.setenv("OMP_NUM_THREADS", "6")
     settings = TrainSettings("gym", env, arguments)
     environments = make_environments(settings, num_envs=3, seed=5)
     assert environments.num_envs == 3

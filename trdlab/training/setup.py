@@ -87,7 +87,7 @@ def resolved(settings: TrainSettings, environments: Environments) -> TrainSettin
         InputError: PyTorch does not find the device.
     """
     images = len(environments.observation_space.shape or ()) >= 2
-    threads = settings.threads or (os.cpu_count() or 1 if images else 1)
+    threads = settings.threads or (_cores() if images else 1)
     weights = str(Path(settings.weights).resolve()) if settings.weights else None
     return replace(settings, device=_device(settings.device), threads=threads, weights=weights)
 
@@ -220,6 +220,16 @@ def _steps_per_second(trainer: "Trainer", *, until: int | None, at_most: float) 
             break
         trainer.step()
     return (trainer.agent_steps - before) / max(passed, 1e-9)
+
+
+def _cores() -> int:
+    """Returns how many threads may compute here: as the user says, or the system."""
+    told = os.environ.get("OMP_NUM_THREADS", "")
+    if told.isdigit() and int(told) > 0:
+        return int(told)
+    if hasattr(os, "sched_getaffinity"):  # a container may have fewer than the machine
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _device(wanted: str) -> str:

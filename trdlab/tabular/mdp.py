@@ -220,6 +220,25 @@ class MDP:
         return f"State {row // self.num_actions}, action {row % self.num_actions}"
 
 
+def take_rows(matrix: "csr_array", rows: IntArray) -> "csr_array":
+    """Returns `matrix[rows]`; where all rows hold equally many entries, in half the time.
+
+    Args:
+        matrix: `[M, S]`.
+        rows: at most M of them.
+    """
+    from scipy.sparse import csr_array
+
+    length = int(matrix.indptr[1])
+    if not (np.diff(matrix.indptr) == length).all():
+        return matrix[rows]
+    data, indices = (
+        part.reshape(-1, length).take(rows, axis=0).ravel()
+        for part in (matrix.data, matrix.indices)
+    )
+    return csr_array((data, indices, matrix.indptr[: len(rows) + 1]), (len(rows), matrix.shape[1]))
+
+
 def as_policy(probabilities: Any, shape: tuple[int, ...]) -> FloatArray:
     """Returns a stochastic policy `[S, A]`, checked.
 

@@ -7,7 +7,7 @@ import numpy as np
 from trdlab.arrays import FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.tabular.mdp import MDP, SMALL
+from trdlab.tabular.mdp import MDP, SMALL, take_rows
 from trdlab.tabular.solve import Solution
 
 MAX_GIGABYTES = 8.0
@@ -24,18 +24,22 @@ def steps(mdp: MDP, solution: Solution, count: int) -> Iterator[FloatArray]:
     """
     gamma, expect = solution.gamma, mdp.expect
     average, follow = along(mdp, solution.policy, gamma)
-    reward, value = mdp.expected_rewards, average(solution.q_values)  # [S, A], [S]
     if count == 0:
         yield solution.q_values
-    for step in range(1, count + 1):
+        return
+    reward = mdp.expected_rewards  # [S, A]
+    for step in range(1, count):
         yield reward
-        if step < count:
-            ahead = gamma * average(reward)  # [S]
-            if step % _LOOK == 0 and not ahead.any() and not value.any():
-                return
-            reward, value = expect(ahead), follow(value)
-        else:
-            yield expect(gamma * value)
+        ahead = average(reward)  # [S]
+        if step % _LOOK == 0 and not ahead.any():
+            return  # nor will there be anything in any later step
+        ahead *= gamma
+        reward = expect(ahead)
+    yield reward
+    value = average(solution.q_values)  # [S]
+    for _ in range(count - 1):  # not beside the rewards: so the policy's rows stay in the cache
+        value = follow(value)
+    yield expect(gamma * value)
 
 
 def components(mdp: MDP, solution: Solution, axis: TimeAxis) -> Iterator[FloatArray]:
@@ -110,7 +114,7 @@ def along(
     if mdp.num_states <= SMALL:
         return average, lambda v: gamma * average(mdp.expect(v))
     if rows is not None:
-        chain = mdp.matrix[rows]
+        chain = take_rows(mdp.matrix, rows)
         chain.data *= gamma
     else:
         from scipy.sparse import csr_array
@@ -130,6 +134,6 @@ def _averaging(policy: FloatArray, rows: IntArray | None) -> Callable[[FloatArra
 
 def _rows(policy: FloatArray) -> IntArray | None:
     """Returns `[S]`, s·A + a of the one action that is taken in each state, if it is one."""
-    actions = policy.argmax(axis=1)
-    rows = np.arange(0, policy.size, policy.shape[1]) + actions
-    return rows if (policy.ravel().take(rows) == 1.0).all() else None
+    rows = np.flatnonzero(policy)  # at least one in each state: its probabilities sum to 1
+    single = len(rows) == len(policy) and bool((policy.ravel().take(rows) == 1.0).all())
+    return rows if single else None

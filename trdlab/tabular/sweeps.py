@@ -15,7 +15,7 @@ import numpy as np
 
 from trdlab.arrays import FloatArray, IntArray
 from trdlab.errors import InputError, TrdlabError
-from trdlab.tabular.mdp import MDP
+from trdlab.tabular.mdp import MDP, take_rows
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -41,12 +41,10 @@ class _Block:
 
     def __init__(self, span: slice, matrix: "csr_array", rewards: FloatArray) -> None:
         self.span, self.matrix, self.rewards = span, matrix, rewards
-        size, lengths = span.stop - span.start, np.diff(matrix.indptr)
+        size = span.stop - span.start
         self._first_rows = np.arange(0, len(rewards), len(rewards) // size)  # [b], of each state
-        self._length = int(lengths[0]) if (lengths == lengths[0]).all() else None
         self._rows = np.full(size, -1)  # [b], of the chosen actions: none yet
-        self._gains: FloatArray = rewards[:0]  # [b], their rewards
-        self._chain = matrix  # [b, S], those rows themselves
+        self._chain, self._gains = matrix, rewards  # [b, S] and [b]: those rows, their rewards
 
     def improve(self, values: FloatArray) -> tuple[float, bool]:
         """Applies the Bellman operator in place, and chooses the best actions.
@@ -58,10 +56,11 @@ class _Block:
         q_values += self.rewards
         rows = q_values.reshape(len(self._rows), -1).argmax(axis=1)  # the first of equals
         rows += self._first_rows
-        changed = np.flatnonzero(rows != self._rows)
-        if len(changed):
-            self._choose(rows, changed)
-        return self._replace(values, q_values[rows]), len(changed) > 0
+        other = not np.array_equal(rows, self._rows)
+        if other:
+            self._rows, self._gains = rows, self.rewards[rows]
+            self._chain = take_rows(self.matrix, rows)
+        return self._replace(values, q_values[rows]), other
 
     def evaluate(self, values: FloatArray, sweeps: int) -> float:
         """Applies the chosen actions' operator some times; returns the last largest change."""
@@ -69,18 +68,6 @@ class _Block:
         for _ in range(sweeps - 1):
             np.add(self._chain @ values, self._gains, out=own)
         return self._replace(values, self._chain @ values + self._gains)
-
-    def _choose(self, rows: IntArray, changed: IntArray) -> None:
-        """Takes over the `rows [b]`, of which those of the states `changed` are new."""
-        begins = self._rows[0] < 0
-        self._rows, self._gains = rows, self.rewards[rows]
-        if begins or self._length is None:
-            self._chain = self.matrix[rows]
-            return
-        for name in ("indices", "data"):  # new rows are as long as old ones, and take their places
-            old = getattr(self._chain, name).reshape(-1, self._length)
-            new = getattr(self.matrix, name).reshape(-1, self._length)
-            old[changed] = new[rows[changed]]
 
     def _replace(self, values: FloatArray, new: FloatArray) -> float:
         own = values[self.span]
@@ -244,7 +231,8 @@ def _blocks(mdp: MDP, gamma: float, order: IntArray) -> tuple[list[_Block], list
     for b in range(len(readers)):
         span = slice(b * BLOCK, min((b + 1) * BLOCK, size))
         states = order[span]
-        rows = mdp.matrix[(states[:, None] * num_actions + np.arange(num_actions)).ravel()]
+        numbers = (states[:, None] * num_actions + np.arange(num_actions)).ravel()
+        rows = take_rows(mdp.matrix, numbers)
         columns = place[rows.indices]
         matrix = csr_array((gamma * rows.data, columns, rows.indptr), rows.shape)
         blocks.append(_Block(span, matrix, mdp.expected_rewards[states].ravel()))

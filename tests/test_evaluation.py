@@ -149,6 +149,7 @@ def test_means_have_intervals_and_all_of_it_is_json():
     for of in (result.mean, result.interquartile_mean):
         assert 0 <= of.low < of.value < of.high <= 100
     told = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert told["schema"] == "trdlab.evaluation/1"
     assert told["mean"] == {"value": 13.6, "low": result.mean.low, "high": result.mean.high,
                             "level": 0.95}  # fmt: skip
     assert (told["episodes"], told["epsilon"], told["seed"]) == (10, 0.1, 2)

@@ -45,6 +45,7 @@ class Evaluation:
         """Returns plain data, for JSON."""
         means = {"mean": self.mean, "interquartile_mean": self.interquartile_mean}
         return {
+            "schema": "trdlab.evaluation/1",
             "episodes": len(self.returns),
             "epsilon": self.epsilon,
             "seed": self.seed,

@@ -110,9 +110,9 @@ def test_a_configuration_says_what_it_is_for():
         ({"target_sync_updates": 0}, "target_sync_updates is 0."),
         ({"reduction": "max"}, "The reduction is 'max'. Use 'sum' or 'mean'."),
         ({"hidden": [0]}, "--hidden is (0,). It must be sizes above 0."),
-        ({"gamma": 1.0}, "1.0"),
-        ({"N": -1}, "-1"),
-        ({"w": 0}, "0"),
+        ({"gamma": 1.0}, "gamma is 1.0. It must be at least 0 and less than 1"),
+        ({"N": -1}, "The horizon N is -1. It must be a whole number of at least 0."),
+        ({"w": 0}, "The width w is 0. It must be a whole number of at least 1."),
         (
             {"learning_starts": 15, "num_envs": 4, "w": 4},
             "--learning-starts is 15: not one window of w = 4 steps is full by then. "

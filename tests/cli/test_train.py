@@ -1,0 +1,347 @@
+"""`trdlab train`, `resume`, `evaluate` and `runs` as their users see them."""
+
+import io
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import torch
+from rich.console import Console
+
+from trdlab.cli import main
+from trdlab.cli.options import flag
+from trdlab.cli.progress import TrainingProgress, stopping
+from trdlab.deep.presets import PRESETS, preset
+
+Outcome = tuple[int, str, str]
+Trdlab = Callable[..., Outcome]
+
+SMALL = [
+    "--agent-steps=120", "--learning-starts=30", "--batch-size=4", "--hidden=8", "--N=2",
+    "--log-every=40", "--evaluate-episodes=3",
+]  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> Iterator[None]:
+    threads = torch.get_num_threads()
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture
+def trdlab(capsys, monkeypatch) -> Trdlab:
+    """Returns a function that runs a command line: exit code, stdout, stderr."""
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("trdlab.training.setup._MEASURED_SECONDS", 0.05)
+
+    def run(*words: object) -> Outcome:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main([str(word) for word in words])
+        return int(end.value.code or 0), *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory) -> Path:
+    """Returns a run; not to be changed."""
+    out = tmp_path_factory.mktemp("runs") / "pole"
+    with pytest.raises(SystemExit) as end:
+        main(["train", "gym", "CartPole-v1", *SMALL, "--out", str(out)])
+    assert not end.value.code
+    return out
+
+
+def in_shell(*words: object, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    command = [sys.executable, "-m", "trdlab", *map(str, words)]
+    return subprocess.run(command, capture_output=True, env=os.environ | environment, check=False)
+
+
+# ---- help ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["gym", "atari"])
+def test_the_help_has_every_setting_under_its_heading(trdlab, kind):
+    code, out, err = trdlab("train", kind, "--help")
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 80
+    panels = re.split(r"╭─ (.+?) ─+╮", out)
+    shown = dict(zip(panels[1::2], panels[2::2], strict=True))
+    assert list(shown) == [
+        "Arguments", "Options", "Run", "Time axis", "Acting", "Learning", "Reward and ending",
+        "Evaluation", "Running",
+    ]  # fmt: skip
+    keys = [*preset(kind, "X").to_config(), "learning_rate_end", "weights"]
+    for key in keys[2:]:
+        assert re.search(rf"{flag(key)}\b", out), key
+    assert "--w " in shown["Time axis"]
+    assert "--weights" in shown["Learning"]
+    assert "--no-clip-rewards" in shown["Reward and ending"]
+    told = " ".join(out.replace("│", " ").split())
+    for name, (about, lines) in PRESETS[kind].items():
+        assert f"{name}: {about}" in told
+        assert all(key in keys for key in lines)
+    horizon = preset(kind, "X").horizon
+    assert f"--N <int> Number of explicit components; 0 is DQN. [default: ({horizon})]" in told
+
+
+@pytest.mark.parametrize("command", ["resume", "evaluate", "runs"])
+def test_the_help_of_the_others(trdlab, command):
+    code, out, err = trdlab(command, "--help")
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 80
+    assert f"Usage: trdlab {command}" in out
+
+
+def test_train_alone_shows_what_can_be_trained_on(trdlab):
+    code, out, err = trdlab("train")
+    assert (code, err) == (2, "")
+    assert "Train on a Gymnasium environment." in out
+    assert "Train on an Atari game" in out
+
+
+# ---- settings ------------------------------------------------------------------------------------
+
+
+def planned(outcome: Outcome) -> dict[str, Any]:
+    """Returns the configuration that a dry run shows."""
+    code, out, err = outcome
+    assert (code, err) == (0, "")
+    return tomllib.loads(out.partition("\n\n")[0])
+
+
+def test_a_dry_run_shows_what_is_resolved_and_writes_nothing(trdlab, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = trdlab("train", "gym", "CartPole-v1", "--preset", "smoke", "--dry-run", "--w", 2)
+    config = planned(outcome)
+    wanted = preset("gym", "CartPole-v1", "smoke").changed({"w": 2}).to_config()
+    resolved = {"device", "threads"}
+    assert {key: config[key] for key in wanted if key not in resolved} == {
+        key: wanted[key] for key in wanted if key not in resolved
+    }
+    assert config["device"] != "auto"
+    assert config["threads"] == 1
+    assert "Replay memory: up to 4.4" in outcome[1]
+    assert re.search(r"Time: about \S+ \w+, at [\d,]+ agent steps a second", outcome[1])
+    assert outcome[1].endswith("Nothing was written: leave out --dry-run to train.\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_options_of_every_type_and_which_of_preset_file_and_option_wins(trdlab, tmp_path):
+    file = tmp_path / "run.toml"
+    file.write_text("log_every = 9\nagent_steps = 2e3\ndouble = true\nhidden = [5]\n")
+    words = [
+        "--preset",
+        "smoke",
+        "--config",
+        file,
+        "--dry-run",
+        "--no-double",
+        "--hidden",
+        "64, 64",
+    ]
+    words += ["--learning-rate-end", "0", "--reduction", "mean", "--clip-rewards", "--N", 0]
+    words += ["--env-arg", "is_slippery=false", "--env-arg", "map_name=8x8", "--seed", 7]
+    config = planned(trdlab("train", "gym", "FrozenLake-v1", *words))
+    assert config["evaluate_episodes"] == 10  # of the preset
+    assert (config["log_every"], config["agent_steps"]) == (9, 2000)  # of the file
+    assert (config["double"], config["hidden"]) == (False, [64, 64])  # of the command
+    assert (config["learning_rate_end"], config["reduction"]) == (0.0, "mean")
+    assert (config["clip_rewards"], config["N"], config["seed"]) == (True, 0, 7)
+    assert config["env_arg"] == ["is_slippery=false", "map_name=8x8"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["gym"], "Missing argument 'ENV_ID'. See: trdlab train gym --help"),
+        (["atary", "Pong"], "No such command 'atary'. Did you mean 'atari'?"),
+        (["gym", "CartPole-v2"], "no environment 'CartPole-v2'. Did you mean 'CartPole-v1'?"),
+        (["gym", "cartpole-v1"], "Did you mean 'CartPole-v1'?"),
+        (["gym", "nowhere:X-v0"], "nowhere:X-v0 cannot be imported: No module named 'nowhere'."),
+        (["gym", "Pendulum-v1"], "use an environment with a Discrete one."),
+        (["gym", "ALE/Breakout-v5"], "is an Atari game. Use: trdlab train atari ALE/Breakout-v5"),
+        (["atari", "Brekout"], "no Atari game 'Brekout'. Did you mean 'Breakout'?"),
+        (
+            ["atari", "Pong", "--env-arg", "stiky=0.1"],
+            "no argument 'stiky'. Did you mean 'sticky'?",
+        ),
+        (["gym", "CartPole-v1", "--env-arg", "gravity"], "'gravity' is not KEY=VALUE."),
+        (["gym", "CartPole-v1", "--preset", "clasic"], "Did you mean 'classic'?"),
+        (["gym", "CartPole-v1", "--preset", "paper"], "no preset 'paper' for gym. Known: classic"),
+        (["gym", "CartPole-v1", "--config", "none.toml"], "'none.toml' cannot be read"),
+        (["gym", "CartPole-v1", "--learning-rat", "1"], "No such option: --learning-rat (Possible"),
+        (["gym", "CartPole-v1", "--N", "2.5"], "Invalid value for '--N'"),
+        (["gym", "CartPole-v1", "--N", "-1"], "The horizon N is -1. It must be"),
+        (["gym", "CartPole-v1", "--gamma", "1"], "gamma is 1.0. It must be at least 0"),
+        (["gym", "CartPole-v1", "--hidden", "64,x"], "--hidden is '64,x': give sizes, such as"),
+        (["gym", "CartPole-v1", "--hidden", "0"], "--hidden is (0,). It must be sizes above 0."),
+        (["gym", "CartPole-v1", "--epsilon-end", "2"], "--epsilon-end is 2.0. It must be from 0"),
+        (["gym", "CartPole-v1", "--seed", str(2**64)], "It must be less than 2**63."),
+        (["gym", "CartPole-v1", "--learning-starts", "3", "--w", "4"], "Choose 4 or more."),
+    ],
+)
+def test_what_cannot_be_used_is_refused_in_one_line(trdlab, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    for more in ([], ["--dry-run"]):
+        code, out, err = trdlab("train", *words, *more)
+        assert (code, out) == (2, "")
+        assert err.startswith("error: ")
+        assert message in err
+        assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("learning_rat = 1", "'run.toml' has an unknown key 'learning_rat'. Did you mean"),
+        ("agent_steps = 'many'", "'run.toml' has agent_steps = 'many'. It must be a whole number."),
+        ("hidden = ['many']", "'run.toml' has hidden = ['many']. It must be a list of whole"),
+        ("[learning]\nN = 1", "'run.toml' has an unknown key 'learning'."),
+        ("kind = 'atari'", "'run.toml' is for another kind. Here it is 'gym'."),
+        ("N = ", "'run.toml' is not valid TOML"),
+    ],
+)
+def test_a_file_that_cannot_be_used(trdlab, tmp_path, monkeypatch, lines, message):
+    monkeypatch.chdir(tmp_path)
+    Path("run.toml").write_text(lines)
+    code, _, err = trdlab("train", "gym", "CartPole-v1", "--config", "run.toml")
+    assert code == 2
+    assert err.startswith(f"error: {message}")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [tmp_path / "run.toml"]
+
+
+# ---- runs ----------------------------------------------------------------------------------------
+
+
+def test_a_run_from_start_to_score(trdlab, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = trdlab("train", "gym", "CartPole-v1", *SMALL)
+    assert code == 0
+    run, memory, first, *_, trained, kept = err.splitlines()
+    assert run == "Run: runs/CartPole-v1-N2-w1-seed1"
+    assert re.fullmatch(r"Replay memory: up to 4\.\d\d MB(, of .* GB that are free)?\.", memory)
+    assert first == "1 of 120 steps, score –, loss –"
+    assert re.fullmatch(r"Trained 120 agent steps in \d+ seconds?\.", trained)
+    name = "step-120-episodes-3-epsilon-0-seed-1000.json"
+    assert kept == f"Kept: runs/CartPole-v1-N2-w1-seed1/evaluations/{name}"
+    assert out.startswith("3 episodes, greedy, seed 1000; raw rewards, undiscounted\n")
+    assert "mean return" in out
+    assert "error" not in err
+    code, _, err = trdlab("train", "gym", "CartPole-v1", *SMALL, "--evaluate-episodes", 0)
+    assert (code, err.splitlines()[0]) == (0, "Run: runs/CartPole-v1-N2-w1-seed1-2")
+    assert list(Path("runs/CartPole-v1-N2-w1-seed1-2/evaluations").iterdir()) == []
+
+
+def test_an_evaluation_as_json(trdlab, trained):
+    code, out, err = trdlab("evaluate", trained, "--episodes", 2, "--seed", 3, "--json")
+    assert code == 0
+    data = json.loads(out)
+    assert data["schema"] == "trdlab.evaluation/1"
+    assert (data["episodes"], data["seed"], len(data["returns"])) == (2, 3, 2)
+    kept = Path(err.removeprefix("Kept: ").strip())
+    assert json.loads(kept.read_text()) == {"agent_steps": 120, **data}
+    _, again, _ = trdlab("evaluate", trained, "--episodes", 2, "--seed", 3, "--json")
+    assert again == out
+    _, page, _ = trdlab("evaluate", trained, "--episodes", 2, "--epsilon", 0.5)
+    assert "2 episodes, greedy, 50.0% random actions, seed 1000" in page
+    code, _, err = trdlab("evaluate", trained, "--epsilon", 2)
+    assert code == 2
+    assert "Invalid value for '--epsilon'" in err
+
+
+def test_the_list_of_runs(trdlab, trained, tmp_path):
+    shutil.copytree(trained, tmp_path / "pole")
+    torn = Path(shutil.copytree(trained, tmp_path / "torn"))
+    (torn / "manifest.json").write_text("{")
+    edited = Path(shutil.copytree(trained, tmp_path / "edited"))
+    (edited / "config.toml").write_text("kind = 'gym'\nenv = 'X'\nagent_steps = 'many'")
+    (tmp_path / "no run").mkdir()
+    code, out, err = trdlab("runs", tmp_path)
+    assert (code, err) == (0, "")
+    header, *rows = [" ".join(line.split()) for line in out.splitlines()]
+    assert header == "run environment N w steps score status"
+    assert any(re.fullmatch(r"pole CartPole-v1 2 1 120 [\d.]+ done", row) for row in rows)
+    assert any(row.startswith("torn ") for row in rows)
+    assert any(row.startswith("edited Its config.toml has") for row in rows)
+    assert "no run" not in out
+    code, out, _ = trdlab("runs", tmp_path / "nowhere")
+    assert (code, out) == (0, f"There are no runs in '{tmp_path / 'nowhere'}'.\n")
+
+
+def test_pipes_get_plain_text(trained, tmp_path):
+    words = ("train", "gym", "FrozenLake-v1", *SMALL, "--out", tmp_path / "run")
+    done = in_shell(*words, COLUMNS="80", PYTHONIOENCODING="ascii:strict")
+    assert done.returncode == 0, done.stderr.decode()
+    assert b"\x1b" not in done.stdout + done.stderr
+    assert done.stdout.isascii()
+    assert done.stdout.startswith(b"3 episodes, greedy")
+    assert b"1 of 120 steps" in done.stderr
+    assert b"1 of 120 steps" not in done.stdout
+
+
+# ---- progress and signals ------------------------------------------------------------------------
+
+
+def steps(count: int) -> Any:
+    return SimpleNamespace(agent_steps=count)
+
+
+def metrics(score: float | None, loss: float | None) -> Any:
+    return SimpleNamespace(score=score, loss=loss)
+
+
+def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
+    now = [1000.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    console = Console(file=io.StringIO(), width=80)
+    with TrainingProgress(console, total=100_000, done=40_000) as progress:
+        for step in range(1, 60):
+            now[0] += 0.5
+            if step == 30:
+                progress.on_metrics(metrics(195.044, 0.01234))
+            progress.on_step(steps(40_000 + 100 * step))
+    assert console.file.getvalue().splitlines() == [  # type: ignore[attr-defined]
+        "40,100 of 100,000 steps, score –, loss –",
+        "42,100 of 100,000 steps, 200/s, score –, loss –",
+        "44,100 of 100,000 steps, 200/s, score 195, loss 0.0123",
+    ]
+
+
+def test_on_a_terminal_there_is_a_bar():
+    console = Console(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
+    with TrainingProgress(console, total=1000) as progress:
+        progress.on_metrics(metrics(-20.5, None))
+        progress.on_step(steps(500))
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "500 of 1,000 steps" in shown
+    assert "score -20.5, loss –" in shown
+    assert "━" in shown
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_asks_and_the_next_one_is_not_held_up(number):
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    with stopping() as stop:
+        assert not stop()
+        signal.raise_signal(number)
+        assert stop()
+        assert stop.code == 128 + number
+        assert {each: signal.getsignal(each) for each in before} == before
+    with stopping():
+        assert signal.getsignal(number) is not before[number]
+    assert {each: signal.getsignal(each) for each in before} == before

@@ -1,9 +1,9 @@
-"""Prepares docstrings for the reference pages."""
+"""Prepares docstrings, and the signatures above them, for the reference pages."""
 
 import re
 from typing import Any
 
-from griffe import Extension, Object
+from griffe import ExprCall, Extension, Function, Object
 
 _EXAMPLE = re.compile(r"^>>> .*?(?=\n[ \t]*\n|\Z)", re.DOTALL | re.MULTILINE)
 _ERRATA = re.compile(r"\(errata [^)]*\)")
@@ -11,12 +11,20 @@ _ROW = re.compile(r"\b([PC]\d+)\b")
 
 
 class Docstrings(Extension):
-    """Fences the examples of a docstring as code, and links the rows of the errata it names."""
+    """Fences the examples of a docstring as code, and links the rows of the errata it names.
+
+    Of a setting's default, help and so on (`_option` in `trdlab.deep.settings`) only the default is
+    left: signatures are shown with it.
+    """
 
     def on_object(self, *, obj: Object, **_: Any) -> None:
         """Changes the docstring of a module, class, function or attribute."""
         if obj.docstring:
             obj.docstring.value = prepared(obj.docstring.value)
+        for parameter in obj.parameters if isinstance(obj, Function) else ():
+            default = parameter.default
+            if isinstance(default, ExprCall) and str(default.function) == "_option":
+                parameter.default = default.arguments[0]
 
 
 def prepared(docstring: str) -> str:

@@ -1,7 +1,9 @@
 """The machinery of the documentation: lessons become pages, docstrings become Markdown."""
 
 import importlib.util
+import json
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -148,6 +150,103 @@ def test_each_row_of_the_errata_has_an_anchor_and_says_what_trdlab_does() -> Non
         assert f"{{ #{row.lower()} }}" in part
         assert "**There.**" in part
         assert "**trdlab.**" in part
+
+
+def test_signatures_show_the_default_of_a_setting_and_no_more() -> None:
+    griffe = pytest.importorskip("griffe")
+    package = griffe.visit(
+        "settings",
+        filepath=Path("settings.py"),
+        code="class Settings:\n    def __init__(self, seed=_option(1, 'Of it.'), n=f(2)): ...\n",
+    )
+    init = package["Settings.__init__"]
+    docstrings.Docstrings().on_object(obj=init)
+    assert [str(of.default) for of in init.parameters][1:] == ["1", "f(2)"]
+
+
+README, TRAIN = (ROOT / "README.md", ROOT / "docs" / "train.md")
+RUN, GAME = "CartPole-v1-N10-w1-seed1", "Breakout-N40-w1-seed1"
+
+
+def blocks(page: Path, kind: str) -> list[str]:
+    """Returns the code blocks of one kind that are only shown, not run while the site is built."""
+    return re.findall(rf"^```{kind}\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S)
+
+
+def shown_commands() -> list[str]:
+    lines = [
+        line
+        for page in (README, TRAIN)
+        for block in blocks(page, "console")
+        for line in block.splitlines()
+    ]
+    return [line.removeprefix("$ ") for line in lines if line.startswith("$ trdlab")]
+
+
+@pytest.mark.parametrize("command", shown_commands())
+def test_every_command_that_is_shown_is_one(command: str) -> None:
+    from typer.main import get_command
+
+    from trdlab.cli.app import new_app
+
+    words = shlex.split(command, comments=True)[1:]
+    group: Any = get_command(new_app(words))
+    context = group.make_context("trdlab", words)
+    while hasattr(group, "resolve_command"):
+        rest = [*context._protected_args, *context.args]
+        name, group, rest = group.resolve_command(context, rest)
+        context = group.make_context(name, rest, parent=context)  # raises for an unknown option
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Returns a folder with runs of the names that the pages use, hardly trained."""
+    from trdlab.deep.presets import preset
+    from trdlab.training.run import begin, carry_on
+
+    folder = tmp_path_factory.mktemp("pages")
+    little = {
+        "agent_steps": 40,
+        "learning_starts": 20,
+        "capacity": 100,
+        "threads": 1,
+        "log_every": 9,
+    }
+    for kind, env, name in (("gym", "CartPole-v1", RUN), ("atari", "Breakout", GAME)):
+        settings = preset(kind, env).changed({**little, "num_envs": 2})
+        with begin(settings, folder / "runs" / name) as run:
+            assert carry_on(run)
+            held = {path.name for path in run.folder.path.iterdir()}
+    assert {".lock", ".holder.json"} <= held
+    return folder
+
+
+@pytest.mark.parametrize("page", [README, TRAIN], ids=lambda page: page.name)
+def test_the_python_that_is_shown_runs(
+    page: Path, trained: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(trained)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    shown = blocks(page, "python")
+    assert len(shown) >= 3
+    namespace: dict[str, Any] = {}
+    for block in shown:
+        exec(block, namespace)
+    assert capsys.readouterr().out
+
+
+def test_the_files_of_a_run_are_those_of_the_table(trained: Path) -> None:
+    run = trained / "runs" / RUN
+    section = TRAIN.read_text(encoding="utf-8").split("## What lies")[1].split("\n## ")[0]
+    rows = [line for line in section.splitlines() if line.startswith(("| `", "| …"))]
+    told = {name for row in rows for name in re.findall(r"`([\w./]+)`", row.split(" | ")[0])}
+    top = {path.name + "/" * path.is_dir() for path in run.iterdir()} | {".holder.json"}
+    [checkpoint] = (run / "checkpoints").iterdir()
+    held = {path.name for path in checkpoint.iterdir()}
+    assert told == (top - {"checkpoints/"}) | held | {"checkpoints/000100000/"}
+    metrics = json.loads((run / "metrics.jsonl").read_text().splitlines()[-1])
+    row = next(row for row in rows if "metrics.jsonl" in row)
+    assert re.findall(r"`(\w+)`", row.split(" | ")[1])[1:] == list(metrics)
 
 
 def build(config: Path, site: Path) -> "subprocess.CompletedProcess[str]":

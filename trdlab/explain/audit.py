@@ -9,7 +9,7 @@ from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.explain.episodes import Episode
-from trdlab.explain.followed import next_flag
+from trdlab.explain.followed import common_axis, next_flag
 from trdlab.explain.intervals import (
     LEVEL,
     RESAMPLES,
@@ -37,6 +37,11 @@ class Audit:
         num_ends: how many of them ended in between.
         gap: `[N]`, the mean of component i ≥ 1 less γ^w times what follows it; 0 if all is well.
         discount: what the next components are really multiplied by; γ^w if all is well.
+        discount_near: the same of the nearer components alone, those that hold half of what is
+            expected from component 1 on.
+        discount_far: the same of the others; NaN where there are none.
+        explained: the share of the components' size that fits what follows them, whatever the
+            discount; near 1 unless they contradict each other in other ways.
         past_end: how much of what is expected after the end of an episode counts although it ended,
             as a share of γ^w; 0 if all is well, 1 where ends are ignored.
         past_reset: the part of that which is expected in the first observation of an episode: what
@@ -49,6 +54,9 @@ class Audit:
     num_ends: int
     gap: Estimates
     discount: Estimate
+    discount_near: float
+    discount_far: float
+    explained: float
     past_end: Estimate
     past_reset: Estimate
 
@@ -78,9 +86,10 @@ def audit(
         resamples: how many samples of episodes are drawn.
 
     Raises:
-        InputError: there are no components to compare (N = 0), or no two steps w apart.
+        InputError: there are no episodes, or of different time axes; there are no components to
+            compare (N = 0), or no two steps w apart.
     """
-    axis = episodes[0].time_axis
+    axis = common_axis(episodes)
     pairs = [_Pairs.of(episode) for episode in episodes]
     ages = np.concatenate([of.ages for of in pairs])
     if axis.horizon == 0 or not ages.size:
@@ -91,14 +100,13 @@ def audit(
     edges = np.unique(np.quantile(ages, np.arange(1, NUM_AGES) / NUM_AGES, method="higher"))
     first = _shifted(np.mean([episode.expected[0] for episode in episodes], axis=0))  # [N]
     sums = np.stack([of.sums(edges, first) for of in pairs])  # [E, 5, ages, N]
-    drawn, discount = (
-        draws(len(sums), resamples, np.random.default_rng(seed)),
-        axis.gamma**axis.width,
-    )
+    drawn = draws(len(sums), resamples, np.random.default_rng(seed))  # [1 + R, E]
+    discount = axis.gamma**axis.width
     count, before, after = pooled(drawn, sums[:, :3].sum(axis=2)).transpose(1, 0, 2)
     gap = (before - discount * after) / np.maximum(count, 1.0)  # [1 + R, N]
-    fitted = _fitted(drawn, sums[:, 1:].reshape(len(sums), 4, -1), discount)  # [1 + R, 3]
-    enough = has_enough(sums)
+    enough, mass = has_enough(sums), np.abs(before[0]).cumsum()  # [N]
+    near = np.arange(axis.horizon) <= (mass >= mass[-1] / 2.0).argmax()
+    fitted = _fitted(drawn, sums[:, 1:], discount)
     estimates = percentiles(fitted, level, enough)
     return Audit(
         time_axis=axis,
@@ -106,6 +114,9 @@ def audit(
         num_ends=sum(int((~of.goes_on).sum()) for of in pairs),
         gap=percentiles(gap, level, enough),
         discount=estimates[0],
+        discount_near=_fitted(drawn[:1], sums[:, 1:, :, near], discount)[0, 0],
+        discount_far=_fitted(drawn[:1], sums[:, 1:, :, ~near], discount)[0, 0],
+        explained=fitted[0, 3],
         past_end=estimates[1],
         past_reset=estimates[2],
     )
@@ -159,17 +170,23 @@ def _shifted(components: FloatArray) -> FloatArray:
 
 
 def _fitted(drawn: FloatArray, sums: FloatArray, discount: float) -> FloatArray:
-    """Returns `[1 + R, 3]`: d, (b + c)/γ^w and c/γ^w of sums `[E, 4, cells]` (see `audit`).
+    """Returns `[1 + R, 4]`: d, (b + c)/γ^w, c/γ^w and the share that they explain.
 
-    Products are taken between different episodes only, where chance is independent: that of what
-    follows would otherwise make d too small.
+    They are fitted to sums `[E, 4, ages, n]` as `audit` describes it. Products are taken between
+    different episodes only, where chance is independent: that of what follows would otherwise make
+    d too small.
     """
+    sums = sums.reshape(len(sums), 4, -1)  # [E, 4, cells]
+    if not sums.size:
+        return np.full((len(drawn), 4), np.nan)
     total = pooled(drawn, sums)  # [1 + R, 4, cells]
     same = pooled(drawn**2, sums @ sums.transpose(0, 2, 1))  # [1 + R, 4, 4]
     products = total @ total.transpose(0, 2, 1) - same
     solved = np.linalg.pinv(products[:, 1:, 1:], rcond=1e-10, hermitian=True)
-    d, b, c = (solved @ products[:, 1:, :1])[..., 0].T
+    d, b, c = factors = (solved @ products[:, 1:, :1])[..., 0].T  # 3 of [1 + R]
+    explained = (factors * products[:, 1:, 0].T).sum(axis=0)
+    size = np.where(products[:, 0, 0] > 0.0, products[:, 0, 0], np.nan)
     seen = np.abs(total[:, 1:]).max(axis=2) > 0.0  # [1 + R, 3]
     past = np.where(seen[:, 1:].any(axis=1), (b + c) / discount, np.nan)
     reset = np.where(seen[:, 2], c / discount, np.nan)
-    return np.stack([np.where(seen[:, 0], d, np.nan), past, reset], axis=1)
+    return np.stack([np.where(seen[:, 0], d, np.nan), past, reset, explained / size], axis=1)

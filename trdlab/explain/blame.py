@@ -16,7 +16,8 @@ from trdlab.statistics import Estimate
 LARGEST_SHIFT = 10
 AGREEMENT = 0.99
 """The share of bootstrap samples in which a shift must be the best one, to be blamed."""
-
+MIN_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25
+"""Below this the discount of a component cannot be taken out of it again."""
 SLACK = 0.1
 """How far from 1 an amount may be, before it is blamed."""
 
@@ -78,12 +79,12 @@ def blame(
         InputError: there are fewer than 2 explicit components, or their discounts vanish.
     """
     axis = samples.time_axis
-    if axis.horizon < 2 or axis.discounts[-2] < np.finfo(np.float64).tiny ** 0.25:
+    if axis.horizon < 2 or axis.discounts[-2] < MIN_DISCOUNT:
         raise InputError(
             f"Components of {axis} cannot stand in for each other.",
             "Decompose with N of at least 2, and γ above 0.",
         )
-    bootstrap = Bootstrap(samples, np.random.default_rng(seed), level, resamples)
+    bootstrap = _Bootstrap(samples, np.random.default_rng(seed), level, resamples)
     known = samples.known[:, :-1]  # [M, N]
     p = samples.predicted[:, :-1] / axis.discounts[:-1]
     o = np.where(known, samples.observed[:, :-1] / axis.discounts[:-1], 0.0)
@@ -128,7 +129,7 @@ def is_off(amount: Estimate) -> bool:
 
 
 @dataclass(frozen=True)
-class Bootstrap:
+class _Bootstrap:
     """How intervals are drawn: from which episodes, by what chance."""
 
     samples: Samples
@@ -148,7 +149,7 @@ class Bootstrap:
 
 
 def _best_shift(
-    bootstrap: Bootstrap, p: FloatArray, o: FloatArray, known: BoolArray
+    bootstrap: _Bootstrap, p: FloatArray, o: FloatArray, known: BoolArray
 ) -> tuple[int, float]:
     """Returns the shift at which p and o correlate best, and how surely it is the best.
 
@@ -191,7 +192,7 @@ def _cosine(product: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     return np.where(square > 0.0, product / np.sqrt(np.where(square > 0.0, square, 1.0)), 0.0)
 
 
-def _amount(bootstrap: Bootstrap, p: FloatArray, o: FloatArray, known: BoolArray) -> Estimate:
+def _amount(bootstrap: _Bootstrap, p: FloatArray, o: FloatArray, known: BoolArray) -> Estimate:
     """Returns the median over components of p̄/ō, weighted by |ō|; both are `[M, K]`.
 
     The bars are means over samples, so that noise in single predictions, which would look like too
@@ -214,7 +215,7 @@ def _amount(bootstrap: Bootstrap, p: FloatArray, o: FloatArray, known: BoolArray
 
 
 def _smear(
-    bootstrap: Bootstrap, bend: FloatArray, missed: FloatArray, known: BoolArray
+    bootstrap: _Bootstrap, bend: FloatArray, missed: FloatArray, known: BoolArray
 ) -> Estimate:
     """Returns x of the best `missed` = x·`bend`, over all components and samples `[M, K]`."""
     seen = np.where(known, bend, 0.0)

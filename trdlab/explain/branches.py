@@ -94,6 +94,7 @@ class Branching:
         environments: CopyableEnvironments,
         *,
         every: int,
+        epsilon: float = 0.0,
         seed: int = 0,
         foils: bool = False,
     ) -> Branches:
@@ -105,6 +106,8 @@ class Branching:
         Args:
             environments: E of them; they are reset.
             every: the steps from one moment to the next.
+            epsilon: the chance of a random action in the episodes, as in `collect`; after its first
+                action a copy follows the policy alone.
             seed: of the actions, the moments and the copies.
             foils: whether each copy begins with an action other than the policy's, drawn evenly.
         """
@@ -116,6 +119,8 @@ class Branching:
             decision = decide(self.estimator, stack.observations[running], self.policy)
             actions = np.zeros(count, dtype=np.int64)
             actions[running] = decision.draw(rng)
+            random = running & (rng.random(count) < epsilon)
+            actions[random] = rng.integers(environments.num_actions, size=int(random.sum()))
             due = running & (age % every == phase)
             if due.any():
                 here = decision.decomposition.components[due[running]]  # [M′, A, N+1]

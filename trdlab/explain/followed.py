@@ -88,21 +88,31 @@ def pool(episodes: Sequence[Episode]) -> Samples:
     Raises:
         InputError: there are no episodes, or they are of different time axes.
     """
-    axes = {episode.time_axis for episode in episodes}
-    if len(axes) != 1:
-        raise InputError(
-            f"There are {len(episodes)} episodes on {len(axes)} time axes.",
-            "Give one episode or more, all of one estimator.",
-        )
+    time_axis = common_axis(episodes)
     observed, known = zip(*map(what_followed, episodes), strict=True)
     return Samples(
-        time_axis=axes.pop(),
+        time_axis=time_axis,
         predicted=np.concatenate([episode.predicted for episode in episodes]).astype(np.float64),
         observed=np.concatenate(observed),
         known=np.concatenate(known),
         episode=np.repeat(np.arange(len(episodes)), [len(episode) for episode in episodes]),
         num_episodes=len(episodes),
     )
+
+
+def common_axis(episodes: Sequence[Episode]) -> TimeAxis:
+    """Returns the time axis of some episodes.
+
+    Raises:
+        InputError: there are no episodes, or they are of different time axes.
+    """
+    axes = {episode.time_axis for episode in episodes}
+    if len(axes) != 1:
+        raise InputError(
+            f"There are {len(episodes)} episodes on {len(axes)} time axes.",
+            "Give one episode or more, all of one estimator.",
+        )
+    return axes.pop()
 
 
 def next_flag(flags: BoolArray, nowhere: int) -> IntArray:

@@ -7,8 +7,8 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.errors import InputError
 from trdlab.explain.episodes import Episode
+from trdlab.explain.followed import common_axis
 from trdlab.explain.intervals import LEVEL, RESAMPLES, by_episode
 from trdlab.statistics import Estimate
 from trdlab.tabular import ExactTable, exact
@@ -64,11 +64,9 @@ def hidden(
         resamples: how many samples of episodes are drawn.
 
     Raises:
-        InputError: there are no episodes.
+        InputError: there are no episodes, or they are of different time axes.
     """
-    if not episodes:
-        raise InputError("There are no episodes.", "Give one or more.")
-    axis, rng = episodes[0].time_axis, np.random.default_rng(seed)
+    axis, rng = common_axis(episodes), np.random.default_rng(seed)
     sums = np.stack([[np.abs(of).sum(axis=0) for of in (e.predicted, _gaps(e))] for e in episodes])
     shares = by_episode(
         sums.astype(np.float64),  # [E, 2, N+1]

@@ -49,7 +49,7 @@ def trust(calibration: Calibration) -> Trust:
     axis, sure = calibration.time_axis, trusted(calibration)
     wrong = np.where(
         calibration.is_("nothing to predict"),
-        _is_wrong(calibration),
+        is_wrong(calibration),
         calibration.skill.high <= 0.0,  # NaN, so not wrong, where there is no interval
     )
     components = _leading(sure[:-1])
@@ -64,12 +64,12 @@ def trust(calibration: Calibration) -> Trust:
 
 def trusted(calibration: Calibration) -> BoolArray:
     """Returns `[N+1]`: the components that are trusted, each by itself."""
-    nothing = calibration.is_("nothing to predict") & ~_is_wrong(calibration)
+    nothing = calibration.is_("nothing to predict") & ~is_wrong(calibration)
     return nothing | (calibration.skill.low > 0.0)  # NaN, so false, where there is no interval
 
 
-def _is_wrong(calibration: Calibration) -> BoolArray:
-    """Returns `[N+1]`: where the error is larger than that of a constant guess elsewhere."""
+def is_wrong(calibration: Calibration) -> BoolArray:
+    """Returns `[N+1]`: where the error is larger than a constant guess's where rewards vary."""
     scale = np.maximum(calibration.time_axis.discounts, np.finfo(np.float64).tiny) ** 2
     guess = (calibration.variance / scale)[calibration.is_("judged")]
     usual = float(guess.mean()) if guess.size else 0.0

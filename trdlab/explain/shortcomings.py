@@ -1,0 +1,225 @@
+"""Claims about what is wrong with a forecast, what it hides, and what it was judged by."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from trdlab.explain.blame import is_off
+from trdlab.explain.faults import is_discount_wrong, is_end_ignored
+from trdlab.explain.finding import agrees
+from trdlab.explain.hidden import SHARE
+from trdlab.explain.trust_report import TrustReport
+from trdlab.explain.verdicts import TrustFinding
+from trdlab.statistics import Estimate
+
+WORTH_SAYING = 0.005
+"""A smaller share is not said."""
+
+# ---- what is wrong -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TooLate(TrustFinding):
+    """Rewards are predicted some steps too late."""
+
+    sign: ClassVar[int] = 1
+
+    steps: int
+
+    def holds(self, report: TrustReport) -> bool:
+        shift = 0 if report.blame is None else report.blame.shift
+        return self.steps > 0 and shift * report.time_axis.width == self.sign * self.steps
+
+
+@dataclass(frozen=True)
+class TooEarly(TooLate):
+    """Rewards are predicted some steps too early."""
+
+    sign: ClassVar[int] = -1
+
+
+@dataclass(frozen=True)
+class AmountOff(TrustFinding):
+    """Surely more, or less, is predicted than comes."""
+
+    times: float
+
+    def holds(self, report: TrustReport) -> bool:
+        if report.blame is None:
+            return False
+        amount = report.blame.amount
+        return is_off(amount) and agrees(self.times, amount.value)
+
+
+@dataclass(frozen=True)
+class Smeared(TrustFinding):
+    """Neighbouring steps surely share what belongs to one of them."""
+
+    def holds(self, report: TrustReport) -> bool:
+        return report.blame is not None and report.blame.smear.low > 0.0
+
+
+@dataclass(frozen=True)
+class DiscountOff(TrustFinding):
+    """Components are surely not multiplied by γ^w from one to the next."""
+
+    measured: float
+    expected: float
+
+    def holds(self, report: TrustReport) -> bool:
+        if report.audit is None:
+            return False
+        axis, found = report.time_axis, report.audit.discount
+        return (
+            is_discount_wrong(report.audit)
+            and agrees(self.measured, found.value)
+            and agrees(self.expected, axis.gamma**axis.width)
+        )
+
+
+@dataclass(frozen=True)
+class GoesOnAfterEnd(TrustFinding):
+    """What is expected after an end surely counts by more than half."""
+
+    share: float
+
+    def holds(self, report: TrustReport) -> bool:
+        if report.audit is None:
+            return False
+        return is_end_ignored(report.audit) and agrees(self.share, report.audit.past_end.value)
+
+
+@dataclass(frozen=True)
+class GoesOnInNext(GoesOnAfterEnd):
+    """So does what is expected at the start of an episode: the next one is mistaken for this."""
+
+    def holds(self, report: TrustReport) -> bool:
+        return super().holds(report) and report.audit.past_reset.low > 0.5  # type: ignore[union-attr]
+
+
+# ---- what is hidden, and what it was judged by ---------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ResidualTrusted(TrustFinding):
+    """The residual is surely predicted better than by a constant guess."""
+
+    component: int
+
+    def holds(self, report: TrustReport) -> bool:
+        return self.component == report.time_axis.horizon and _residual_skill(report).low > 0.0
+
+
+@dataclass(frozen=True)
+class ResidualUnsure(TrustFinding):
+    """The residual may be predicted no better than by a constant guess."""
+
+    component: int
+
+    def holds(self, report: TrustReport) -> bool:
+        return self.component == report.time_axis.horizon and _residual_skill(report).low <= 0.0
+
+
+@dataclass(frozen=True)
+class ResidualUnjudged(TrustFinding):
+    """Too few different episodes, or none, came to an end that shows the residual."""
+
+    component: int
+    episodes: int
+
+    def holds(self, report: TrustReport) -> bool:
+        told = report.calibration
+        unjudged = told.states[-1] in ("too few episodes", "unknown")
+        here = self.component == report.time_axis.horizon
+        return here and unjudged and bool(self.episodes == told.num_episodes[-1])
+
+
+@dataclass(frozen=True)
+class HiddenValue(TrustFinding):
+    """The share of what is predicted that lies in the residual."""
+
+    component: int
+    share: float
+
+    def holds(self, report: TrustReport) -> bool:
+        share = report.hidden.value.value
+        residual = self.component == report.time_axis.horizon > 0
+        return residual and share >= WORTH_SAYING and agrees(self.share, share)
+
+
+@dataclass(frozen=True)
+class HiddenGap(TrustFinding):
+    """The same of the difference between the best action and the next best."""
+
+    component: int
+    share: float
+
+    def holds(self, report: TrustReport) -> bool:
+        share = report.hidden.gap.value
+        residual = self.component == report.time_axis.horizon > 0
+        return residual and share >= WORTH_SAYING and agrees(self.share, share)
+
+
+@dataclass(frozen=True)
+class WouldSuffice(TrustFinding):
+    """The least N that leaves no more than a share of the observed rewards to the residual."""
+
+    horizon: int
+    share: float
+
+    def holds(self, report: TrustReport) -> bool:
+        n, width, tails = self.horizon, report.time_axis.width, report.hidden.observed_tails
+        if not report.time_axis.horizon < n or not (n - 1) * width < len(tails) - 1:
+            return False
+        at = min(n * width, len(tails) - 1)
+        enough = tails[at] <= SHARE < tails[(n - 1) * width]
+        return bool(enough) and agrees(self.share, SHARE)
+
+
+@dataclass(frozen=True)
+class JudgedOn(TrustFinding):
+    """The episodes it was judged by."""
+
+    episodes: int
+    steps: int
+    ended: int
+    cut: int
+
+    def holds(self, report: TrustReport) -> bool:
+        counts = (report.num_episodes, report.num_steps)
+        ends = (report.endings.terminated, report.endings.truncated)
+        return (self.episodes, self.steps) == counts and (self.ended, self.cut) == ends
+
+
+@dataclass(frozen=True)
+class LivesEnd(TrustFinding):
+    """How often a life was lost, where that counts as an end."""
+
+    ends: ClassVar[bool] = True
+
+    count: int
+
+    def holds(self, report: TrustReport) -> bool:
+        told = report.endings
+        return 0 < self.count == told.life_losses and told.life_loss_ends == self.ends
+
+
+@dataclass(frozen=True)
+class LivesGoOn(LivesEnd):
+    """The same where it does not."""
+
+    ends: ClassVar[bool] = False
+
+
+@dataclass(frozen=True)
+class SomeRandom(TrustFinding):
+    """The share of random actions, after which nothing was judged."""
+
+    share: float
+
+    def holds(self, report: TrustReport) -> bool:
+        return report.epsilon > 0.0 and agrees(self.share, report.epsilon)
+
+
+def _residual_skill(report: TrustReport) -> Estimate:
+    """Returns the skill of the residual; NaN, of which nothing holds, where it is not judged."""
+    return report.calibration.skill[-1]

@@ -257,6 +257,18 @@ def test_constant_rewards_are_nothing_to_predict_and_no_number():
     assert (trusted.components, trusted.last_step) == (0, None)
 
 
+def test_a_constant_reward_may_be_predicted_a_little_wrong():
+    axis = TimeAxis(0.9, 3)
+
+    def predicting(amount: float) -> Episode:
+        components = np.broadcast_to(amount * axis.discounts, (30, 1, 4))
+        decomposition = RewardDecomposition(components, axis)
+        return episode([2.0] * 30, axis, decomposition=decomposition, terminated=False)
+
+    assert trust(calibrate([predicting(1.9)])).components == 3  # within a tenth
+    assert trust(calibrate([predicting(1.7)])).components == 0
+
+
 def test_rewards_that_never_come_and_are_not_predicted_are_no_evidence():
     found = calibrate([episode([0.0] * n, TimeAxis(0.9, 3)) for n in range(20, 32)])
     trusted = trust(found)

@@ -109,6 +109,7 @@ def reports(draw: st.DrawFn) -> TrustReport:
         ),
         bias=estimates(judged),
         error=Estimates(*[np.full(size, error)] * 3),
+        mean=np.ones(size),
         variance=np.ones(size),
         skill=estimates(judged),
         correlation=estimates(judged),

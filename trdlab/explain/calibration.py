@@ -41,6 +41,7 @@ class Calibration:
         num_episodes: `[N+1]`, the different episodes that these are from.
         bias: `[N+1]`, the mean of predicted − observed.
         error: `[N+1]`, the mean of (predicted − observed)².
+        mean: `[N+1]`, of what was observed.
         variance: `[N+1]`, of what was observed: the error of the best constant prediction.
         skill: `[N+1]`, 1 − error / error of the best constant prediction; 1 is perfect, 0 no better
             than a constant.
@@ -55,6 +56,7 @@ class Calibration:
     num_episodes: IntArray
     bias: Estimates
     error: Estimates
+    mean: FloatArray
     variance: FloatArray
     skill: Estimates
     correlation: Estimates
@@ -131,6 +133,7 @@ def calibrate(
         num_episodes=num_episodes,
         bias=bias,
         error=error,
+        mean=np.where(seen, samples.observed.sum(axis=0) / np.maximum(num_samples, 1), np.nan),
         variance=_variance(*sums[:, [0, 3, 4]].sum(axis=0)),
         skill=skill,
         correlation=correlation,

@@ -8,15 +8,19 @@ from trdlab.arrays import BoolArray
 from trdlab.decomposition import TimeAxis
 from trdlab.explain.calibration import Calibration
 
+SLACK = 0.1
+"""How wrong a forecast may be where the reward was always the same, as a share of it."""
+
 
 @dataclass(frozen=True)
 class Trust:
     """How far a forecast can be trusted.
 
     A component is trusted if the lower end of its skill interval is above zero. So is one with
-    nothing to predict, unless its forecast is wrong by more (in mean square, undiscounted) than a
-    constant guess is at the steps where there is something to predict. The forecast can be trusted
-    as far as all components up to there are trusted.
+    nothing to predict, unless its forecast is wrong: by more than a tenth of the reward that always
+    came, and by more (in mean square, undiscounted) than a constant guess is at the steps where
+    there is something to predict. The forecast can be trusted as far as all components up to there
+    are trusted.
 
     Args:
         time_axis: what the components mean.
@@ -69,11 +73,12 @@ def trusted(calibration: Calibration) -> BoolArray:
 
 
 def is_wrong(calibration: Calibration) -> BoolArray:
-    """Returns `[N+1]`: where the error is larger than a constant guess's where rewards vary."""
+    """Returns `[N+1]`: what would be wrong of a component with nothing to predict (see `Trust`)."""
     scale = np.maximum(calibration.time_axis.discounts, np.finfo(np.float64).tiny) ** 2
     guess = (calibration.variance / scale)[calibration.is_("judged")]
-    usual = float(guess.mean()) if guess.size else 0.0
-    return np.asarray(calibration.error.value / scale > usual + 1e-12)
+    usual = scale * (guess.mean() if guess.size else 0.0)
+    allowed = np.maximum(usual, (SLACK * calibration.mean) ** 2)
+    return np.asarray(calibration.error.value > allowed + 1e-12 * scale)
 
 
 def _leading(flags: BoolArray) -> int:

@@ -9,7 +9,19 @@ Config = dict[str, Any]
 
 PRESETS: dict[Kind, dict[str, tuple[str, Config]]] = {
     "gym": {
-        "classic": ("small control tasks, such as CartPole, in minutes", {}),
+        "classic": (
+            "small control tasks, such as CartPole, in minutes",
+            {
+                "num_envs": 8,
+                "epsilon_end": 0.04,
+                "epsilon_steps": 20_000,
+                "update_every": 2,
+                "batch_size": 64,
+                "learning_rate_end": 0.0,
+                "target_sync_updates": 128,  # each is one Bellman step: 387 of them reach far
+                "hidden": [256, 256],
+            },
+        ),
         "smoke": (
             "seconds, to see that everything works",
             {"agent_steps": 5_000, "log_every": 500, "evaluate_episodes": 10},

@@ -216,6 +216,35 @@ EXERCISES = {
             ),
         ),
     ),
+    "5.1": Exercise(
+        right=6 * 41,
+        hint="Each action has its own vector.",
+        mistakes=(
+            (6 * 40, "That leaves out the residual: a vector has N + 1 entries."),
+            (41, "That is one action's vector. There are six actions."),
+            (46, "Not 6 + 40: every action has a whole vector."),
+        ),
+    ),
+    "5.2": Exercise(
+        right=10 * 250 * 4,
+        hint="Component 1 can begin after the first copy, component 2 after the second, ...",
+        mistakes=(
+            (10 * 250, "Those are updates. There are 4 agent steps for each."),
+            (
+                9 * 250 * 4,
+                "Component 1 needs one copy already, so component 10 needs ten.",
+            ),
+            (11 * 250 * 4, "Component 0 needs no copy: it is the reward itself."),
+        ),
+    ),
+    "5.3": Exercise(
+        right=0.25 + 2.25,
+        hint="Build the target first: the reward, then the discounted vector, the last two added.",
+        mistakes=(
+            (0.25, "What is shifted beyond the end joins the last entry: 1 + 1.5."),
+            (2.5 / 3, "That is the mean over the components. Take the sum."),
+        ),
+    ),
 }
 
 

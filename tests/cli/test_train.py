@@ -27,8 +27,8 @@ Outcome = tuple[int, str, str]
 Trdlab = Callable[..., Outcome]
 
 SMALL = [
-    "--agent-steps=120", "--learning-starts=30", "--batch-size=4", "--hidden=8", "--N=2",
-    "--log-every=40", "--evaluate-episodes=3",
+    "--agent-steps=120", "--num-envs=1", "--capacity=100000", "--learning-starts=30",
+    "--batch-size=4", "--hidden=8", "--N=2", "--log-every=40", "--evaluate-episodes=3",
 ]  # fmt: skip
 
 
@@ -190,7 +190,10 @@ def test_options_of_every_type_and_which_of_preset_file_and_option_wins(trdlab, 
         (["gym", "CartPole-v1", "--hidden", "0"], "--hidden is (0,). It must be sizes above 0."),
         (["gym", "CartPole-v1", "--epsilon-end", "2"], "--epsilon-end is 2.0. It must be from 0"),
         (["gym", "CartPole-v1", "--seed", str(2**64)], "It must be less than 2**63."),
-        (["gym", "CartPole-v1", "--learning-starts", "3", "--w", "4"], "Choose 4 or more."),
+        (
+            ["gym", "CartPole-v1", "--num-envs", "1", "--learning-starts", "3", "--w", "4"],
+            "Choose 4 or more.",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_refused_in_one_line(trdlab, tmp_path, monkeypatch, words, message):

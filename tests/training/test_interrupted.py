@@ -38,6 +38,7 @@ def train(out: Path, num_envs: int) -> list[str]:
         "--N": 2,
         "--w": 3,
         "--batch-size": 4,
+        "--update-every": 4,
         "--learning-starts": 24,
         "--target-sync-updates": 9,
         "--epsilon-end": 0.2,
@@ -59,6 +60,8 @@ class Command:
 import json, os, sys
 import torch._dynamo, trdlab.cli.app, trdlab.gridworld.render, trdlab.training.loading
 from trdlab.cli import main
+
+os.fsync = lambda number: None  # what a killed process has written is not lost
 
 for line in sys.stdin:
     words, error = json.loads(line)
@@ -253,7 +256,7 @@ def test_a_second_signal_ends_it_at_once(command, tmp_path, second, code):
     (command.error.parent / "slow_world.py").write_text(SLOW)
     out, mark = tmp_path / "run", tmp_path / "mark"
     words = ["train", "gym", "slow_world:Slow-v0", "--env-arg", f"mark={mark}", "--out", str(out)]
-    command.start([*words, "--checkpoint-every", "50"])
+    command.start([*words, "--checkpoint-every", "50", "--num-envs", "1"])
     wait_until(mark.exists)
     command.send(signal.SIGINT)
     time.sleep(0.3)

@@ -22,7 +22,7 @@ from safetensors.torch import save_file
 from trdlab.cli import main
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError, OutputError, TrdlabError
-from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_metrics
+from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_metrics, to_toml
 from trdlab.training.loading import load
 from trdlab.training.run import begin, carry_on, resume
 
@@ -65,16 +65,19 @@ class Wayward(CartPoleEnv):
 
 @pytest.fixture(autouse=True, scope="module")
 def _registered() -> Iterator[None]:
-    threads = torch.get_num_threads()
     gym.register("Faulty-v0", Faulty)
     gym.register("Wayward-v0", Wayward)
     yield
     del gym.registry["Faulty-v0"], gym.registry["Wayward-v0"]
-    torch.set_num_threads(threads)
 
 
 def settings(env: str = "CartPole-v1", **lines: Any) -> TrainSettings:
     return TrainSettings("gym", env).changed(LINES | lines)
+
+
+def written(folder: Path, settings: TrainSettings) -> Path:
+    (folder / "run.toml").write_text(to_toml(settings.to_config()))
+    return folder / "run.toml"
 
 
 def train(out: Path, env: str = "CartPole-v1", **lines: Any) -> Path:
@@ -317,8 +320,7 @@ def test_a_disk_that_fills_up(tmp_path, whole, trdlab, monkeypatch, failing):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         sync(number)
 
-    config = tmp_path / "run.toml"
-    config.write_text("\n".join(f"{key} = {value}" for key, value in LINES.items()))
+    config = written(tmp_path, settings())
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", fail)
         outcome = trdlab("train", "gym", "CartPole-v1", "--config", config, "--out", out)
@@ -335,8 +337,7 @@ def test_a_disk_that_fills_up(tmp_path, whole, trdlab, monkeypatch, failing):
 
 @pytest.mark.parametrize("pays", ["nan", "inf", "-inf"])
 def test_a_reward_that_is_no_number_stops_the_run(tmp_path, trdlab, pays):
-    out, config = tmp_path / "run", tmp_path / "run.toml"
-    config.write_text("\n".join(f"{key} = {value}" for key, value in LINES.items()))
+    out, config = tmp_path / "run", written(tmp_path, settings("Faulty-v0"))
     words = ["train", "gym", "Faulty-v0", "--config", config, "--out", out]
     outcome = trdlab(*words, "--env-arg", "at=75", "--env-arg", f"pays={pays}")
     refused(outcome, 1, f"gave the reward {pays} after 74 agent steps. Nothing was learned")
@@ -345,8 +346,7 @@ def test_a_reward_that_is_no_number_stops_the_run(tmp_path, trdlab, pays):
 
 
 def test_a_loss_that_is_not_finite_stops_the_run(tmp_path, trdlab):
-    out, config = tmp_path / "run", tmp_path / "run.toml"
-    config.write_text("\n".join(f"{key} = {value}" for key, value in LINES.items()))
+    out, config = tmp_path / "run", written(tmp_path, settings("Faulty-v0"))
     words = ["train", "gym", "Faulty-v0", "--config", config, "--out", out]
     outcome = trdlab(*words, "--env-arg", "at=32", "--env-arg", "pays=1e30")
     refused(outcome, 1, "The loss is inf at update ")

@@ -7,9 +7,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from trdlab.deep.presets import PRESETS
 from trdlab.deep.replay import ReplayBuffer
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError
+from trdlab.runs import to_toml
 from trdlab.training.setup import (
     default_path,
     describe,
@@ -31,7 +33,7 @@ def written(path: Path, *lines: str) -> Path:
 def test_later_settings_win(tmp_path):
     file = written(tmp_path / "run.toml", "N = 3", "w = 2", "log_every = 7")
     settings = read_settings("gym", "CartPole-v1", "smoke", file, {"w": 4, "hidden": [9]})
-    assert settings.agent_steps == 5_000  # of the preset
+    assert settings.agent_steps == PRESETS["gym"]["smoke"][1]["agent_steps"]
     assert settings.log_every == 7  # of the file, before the preset
     assert settings.horizon == 3
     assert settings.width == 4  # of the command, before the file
@@ -39,12 +41,12 @@ def test_later_settings_win(tmp_path):
     assert settings.gamma == 0.99  # the default
 
 
-def test_a_file_of_another_run_begins_the_same_again(tmp_path):
-    settings = read_settings("gym", "CartPole-v1", "smoke", None, {"double": True})
-    lines = [f"{k} = {v!r}".replace("True", "true").replace("False", "false")
-             for k, v in settings.to_config().items()]  # fmt: skip
-    file = written(tmp_path / "config.toml", *lines)
-    assert read_settings("gym", "CartPole-v1", None, file, {}) == settings
+def test_the_file_of_a_run_begins_the_same_again_whatever_the_presets_say(tmp_path):
+    settings = TrainSettings("gym", "CartPole-v1", seed=3, double=True)
+    assert settings.learning_rate_end is None  # and so it stands in no file
+    file = written(tmp_path / "config.toml", to_toml(settings.to_config()))
+    for name in PRESETS["gym"]:
+        assert read_settings("gym", "CartPole-v1", name, file, {}) == settings
     for kind, env, other in (("gym", "Acrobot-v1", "env"), ("atari", "CartPole-v1", "kind")):
         with pytest.raises(InputError, match=rf"config\.toml' is for another {other}\. Here it is"):
             read_settings(kind, env, None, file, {})  # type: ignore[arg-type]

@@ -35,6 +35,8 @@ def read_settings(
 ) -> TrainSettings:
     """Returns settings from a preset, then a file, then single options; later ones win.
 
+    A file that says what it is for is complete, such as a run's own: no preset stands behind it.
+
     Raises:
         InputError: there is no such preset or file, or a key or value cannot be used.
     """
@@ -42,9 +44,11 @@ def read_settings(
     if config is not None:
         lines = read_config(config)
         for key, here in (("kind", kind), ("env", env)):
-            if lines.pop(key, here) != here:
+            if lines.get(key, here) != here:
                 raise InputError(f"'{config}' is for another {key}.", f"Here it is '{here}'.")
-        settings = settings.changed(lines, f"'{config}'")
+        complete = lines.keys() >= {"kind", "env"}
+        base = TrainSettings(kind, env) if complete else settings
+        settings = base.changed(lines, f"'{config}'")
     return settings.changed(given, "The command")
 
 

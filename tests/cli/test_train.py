@@ -133,7 +133,7 @@ def test_a_dry_run_shows_what_is_resolved_and_writes_nothing(trdlab, tmp_path, m
     }
     assert config["device"] != "auto"
     assert config["threads"] == 1
-    assert re.search(r"Replay memory: up to [4-7]\.\d\d MB", outcome[1])
+    assert re.search(r"Replay memory: up to 4\.\d\d MB", outcome[1])
     assert re.search(r"Time: about \S+ \w+, at [\d,]+ agent steps a second", outcome[1])
     assert outcome[1].endswith("Nothing was written: leave out --dry-run to train.\n")
     assert list(tmp_path.iterdir()) == []

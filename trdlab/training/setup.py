@@ -211,10 +211,19 @@ def plan(settings: TrainSettings) -> Plan:
         learning = _steps_per_second(trainer, until=None, at_most=_MEASURED_SECONDS)
         first = min(settings.learning_starts, settings.agent_steps)
         seconds = first / acting + (settings.agent_steps - first) / learning
-        memory = memory_of(settings, environments, trainer.memory.bytes_per_frame)
+        memory = memory_of(settings, environments, _measured_frame(environments, trainer))
         return Plan(settings, memory, available_memory(), seconds, learning)
     finally:
         environments.close()
+
+
+def _measured_frame(environments: Environments, trainer: "Trainer") -> float | None:
+    """Returns what a frame takes in the memory, where that depends on what it shows."""
+    from trdlab.deep.frames import compresses
+
+    space = environments.observation_space
+    compressed = compresses(space.shape or (), np.dtype(space.dtype))
+    return trainer.memory.bytes_per_frame if compressed else None
 
 
 def _steps_per_second(trainer: "Trainer", *, until: int | None, at_most: float) -> float:

@@ -174,6 +174,13 @@ def test_a_run_tells_what_happens_and_keeps_it(tmp_path):
     assert "threads = 1" in config
 
 
+@pytest.mark.parametrize("num_envs", [1, 8])
+def test_the_same_seed_is_the_same_run_to_the_bit(tmp_path, num_envs):
+    one, same = (result(train(tmp_path / name, num_envs=num_envs)) for name in ("a", "b"))
+    assert one == same
+    assert one != result(train(tmp_path / "c", num_envs=num_envs, seed=2))
+
+
 def test_a_run_that_should_stop_is_saved_where_it_stands(tmp_path, whole):
     with begin(settings(), tmp_path / "run") as run:
         assert not carry_on(run, should_stop=lambda: run.trainer.agent_steps == 47)

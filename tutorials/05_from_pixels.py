@@ -12,23 +12,20 @@
 # %%
 import gymnasium as gym
 import numpy as np
-import torch
 from matplotlib import pyplot as plt
 
 from trdlab.deep.estimator import NetworkEstimator
 from trdlab.deep.networks import build_network
 from trdlab.deep.settings import TrainSettings
-from trdlab.deep.trainer import Trainer
 from trdlab.environments import GymEnvironments
 from trdlab.evaluation import evaluate
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.pixels import pictures
 from trdlab.tabular import exact
-from trdlab.training.setup import future
+from trdlab.training.setup import future, new_trainer, resolved
 
 from exercise import check
 
-torch.set_num_threads(1)  # so that you see the numbers that are printed here
 UP, DOWN, LEFT, RIGHT = range(4)
 
 # %% [markdown]
@@ -82,6 +79,7 @@ settings = TrainSettings(
     learning_rate_end=0.0,
     target_sync_updates=300,
     capacity=20_000,
+    threads=1,  # so that you see the numbers that are printed here
 )
 network = build_network(
     gym.spaces.Box(0, 255, (1, 84, 84), np.uint8), 4, settings.time_axis, seed=1
@@ -120,7 +118,7 @@ environments = GymEnvironments(
         "max_episode_steps": 6,
     },
 )
-trainer = Trainer(settings, environments)
+trainer = new_trainer(resolved(settings, environments), environments)
 estimator = NetworkEstimator(
     trainer.learner.q_network, settings.time_axis, future(settings)
 )

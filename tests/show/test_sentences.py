@@ -13,6 +13,7 @@ from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Finding
 from trdlab.explain.moment import Moment, WhatIf
 from trdlab.explain.tabular import gridworld_moment
+from trdlab.explain.trusted import Trust
 from trdlab.gridworld import Gridworld, load_map, map_names
 from trdlab.show.sentences import TEMPLATES, UnsupportedSentenceError, check, sentences
 from trdlab.tabular import exact
@@ -63,6 +64,8 @@ def moments(draw: st.DrawFn) -> Moment:
     def q_values(value: float) -> np.ndarray:
         return decomposition.value + slope * (value - 0.95) * np.arange(actions)
 
+    components = draw(st.integers(0, horizon))
+    trust = Trust(axis, components, horizon, draw(st.integers(0, components)), draw(st.booleans()))
     return Moment(
         decomposition,
         NAMES[:actions],
@@ -71,6 +74,7 @@ def moments(draw: st.DrawFn) -> Moment:
         tied=draw(st.sampled_from([(), NAMES[:2]])),
         tied_later=draw(st.integers(0, 2)),
         what_ifs=(WhatIf("γ", 0.95, 0.01, 0.99, q_values),),
+        trust=draw(st.sampled_from([None, trust])),
     )
 
 

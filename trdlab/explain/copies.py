@@ -15,6 +15,10 @@ from trdlab.errors import InputError
 from trdlab.tabular import MDP
 
 
+class NotCopyable(InputError):  # noqa: N818  it says what an environment is, not what failed
+    """An environment of which no copies can be made."""
+
+
 class CopyableEnvironments(Environments, Protocol):
     """Environments of which copies can be made, in the middle of their episodes."""
 
@@ -73,7 +77,7 @@ class ModelEnvironments:
                 f"Give {mdp.num_states} probabilities that sum to 1.",
             )
         self.mdp, self.num_envs, self.num_actions = mdp, num_envs, mdp.num_actions
-        self.observation_space = gym.spaces.Discrete(mdp.num_states)
+        self.observation_space: gym.Space[Any] = gym.spaces.Discrete(mdp.num_states)
         self.action_names, self.time_limit = action_names, time_limit
         self._rng, self._begin = np.random.default_rng(seed), np.cumsum(begin)
         self._cumulative = np.cumsum(mdp.probabilities)  # [K], over all rows
@@ -155,13 +159,13 @@ class CopyableGymEnvironments(GymEnvironments):
         """Returns copies of the environments `which [B′]`; their `state_dict` cannot be asked for.
 
         Raises:
-            InputError: an environment cannot be copied.
+            NotCopyable: an environment cannot be copied.
         """
         other, seeds = copy(self), np.random.SeedSequence(seed).spawn(len(which))
         try:
             envs = [deepcopy(self._envs[env]) for env in which]
         except (TypeError, AttributeError, NotImplementedError, RuntimeError) as error:
-            raise InputError(
+            raise NotCopyable(
                 f"{self.env_id} cannot be copied ({error}).", "Ask for no ceiling and no foils."
             ) from error
         for env, words in zip(envs, seeds, strict=True):

@@ -6,6 +6,7 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
+from trdlab.environments import Environments
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
@@ -91,7 +92,7 @@ def counterfactual(
 
 def play_to(
     estimator: Estimator,
-    environments: CopyableEnvironments,
+    environments: Environments,
     steps: int,
     *,
     policy: Policy | None = None,

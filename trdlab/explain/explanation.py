@@ -6,6 +6,7 @@ from trdlab.explain.contrast import contrast
 from trdlab.explain.finding import Finding
 from trdlab.explain.flips import what_would_flip
 from trdlab.explain.forecast import forecast
+from trdlab.explain.limits import limits
 from trdlab.explain.moment import Moment
 
 Findings = tuple[Finding, ...]
@@ -22,6 +23,7 @@ class Explanation:
         contrast: how the futures of action and foil differ.
         flips: what would change the preference between them.
         forecast: what the action is expected to pay, and when.
+        limits: what of that cannot be trusted.
         context: whose future it is, and where ties leave it open.
     """
 
@@ -31,12 +33,13 @@ class Explanation:
     contrast: Findings
     flips: Findings
     forecast: Findings
+    limits: Findings
     context: Findings
 
     @property
     def findings(self) -> Findings:
         """All of them, in the order they are told."""
-        return self.contrast + self.flips + self.forecast + self.context
+        return self.contrast + self.flips + self.forecast + self.limits + self.context
 
 
 def explain(moment: Moment, action: str | None = None, foil: str | None = None) -> Explanation:
@@ -60,6 +63,7 @@ def explain(moment: Moment, action: str | None = None, foil: str | None = None) 
         contrast=() if foil is None else contrast(moment, action, foil),
         flips=() if foil is None else what_would_flip(moment, action, foil),
         forecast=forecast(moment, action),
+        limits=limits(moment),
         context=(WhoseFuture(*astuple(moment.future)), *ties, *later),
     )
 

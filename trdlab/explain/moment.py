@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, closest
 from trdlab.estimator import Estimator, Future
+
+if TYPE_CHECKING:
+    from trdlab.explain.trusted import Trust
 
 RELATIVE_ZERO = 1e-12
 """Two components closer than this, relative to the larger, are the same number."""
@@ -75,6 +78,7 @@ class Moment:
         tied_later: the number of later states where that is so.
         what_ifs: the quantities that can be varied, where there is a model to solve again.
         uncertainty: spread and survival, where they are known.
+        trust: how far such forecasts can be trusted, if that has been judged.
     """
 
     decomposition: RewardDecomposition
@@ -87,6 +91,7 @@ class Moment:
     tied_later: int = 0
     what_ifs: tuple[WhatIf, ...] = ()
     uncertainty: Uncertainty | None = None
+    trust: "Trust | None" = None
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):

@@ -47,6 +47,18 @@ class Trust:
         """Whether all explicit components are trusted."""
         return self.components == self.time_axis.horizon > 0 and self.tested > 0
 
+    @property
+    def doubtful(self) -> BoolArray:
+        """`[N+1]`: the components that are not to be trusted in any one forecast.
+
+        Of the explicit ones these are those beyond the trusted range, or all of them where nothing
+        in that range was tested and it is not the whole; the residual is judged by itself.
+        """
+        beyond = np.arange(self.time_axis.num_components) >= self.components
+        beyond |= not self.tested and self.components < self.time_axis.horizon
+        beyond[-1] = not self.residual
+        return beyond
+
 
 def trust(calibration: Calibration) -> Trust:
     """Returns how far a calibrated forecast can be trusted."""

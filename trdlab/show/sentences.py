@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any
 
 from trdlab.errors import TrdlabError
-from trdlab.explain import contrast, explanation, flips, forecast
+from trdlab.explain import contrast, explanation, flips, forecast, limits
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.finding import Finding, Shown
 from trdlab.formatting import amount, decimals_between, number, percent, plain, significant
@@ -101,6 +101,18 @@ TEMPLATES: dict[type[Finding], str] = {
         "After {action} the episode is likely over by {component:begin}: {chance:percent}."
     ),
     forecast.SurelyOver: "After {action} the episode is over by {component:begin}.",
+    limits.TrustedWhole: "All that was tested of such forecasts can be trusted.",
+    limits.NowhereTrusted: "Such forecasts have not proved better than a guess at any step.",
+    limits.NotTrustedAt: (
+        "What such forecasts say of {component:label} has not proved better than a guess."
+    ),
+    limits.NotTrustedFrom: (
+        "From {component:begin} on such forecasts have not proved better than a guess."
+    ),
+    limits.NotTrustedBetween: (
+        "From {component:begin} on such forecasts have not proved better than a guess, but for "
+        "what lies at {residual:label}."
+    ),
     explanation.WhoseFuture: (
         "After the first action it is the future of {policy}; it counts the {reward} and ends at "
         "{ending}."

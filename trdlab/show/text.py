@@ -1,6 +1,6 @@
 """Explanations as text for a terminal, in rich renderables."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -19,6 +19,7 @@ _SECTIONS = (
     ("contrast", "{action} against {foil}"),
     ("flips", "What would change that"),
     ("forecast", "What {action} promises"),
+    ("limits", "How far to trust it"),
     ("context", "Whose future"),
 )
 _ASCII = str.maketrans({"…": "..", "∞": "inf", "γ": "gamma", "·": "-", "−": "-", "✓": "OK:"})
@@ -34,6 +35,8 @@ def action_table(
 ) -> Table:
     """Returns a row per action: components, Q, undiscounted total; and the contrast below them.
 
+    There are no totals where none are known.
+
     Args:
         moment: what is shown.
         action: the name of the explained action.
@@ -46,11 +49,13 @@ def action_table(
     table.add_column("action", no_wrap=True)
     table.add_column(fit(header, ascii_only=ascii_only))
     table.add_column("Q", justify="right", no_wrap=True)
-    table.add_column("total", justify="right", no_wrap=True)
+    if moment.totals is not None:
+        table.add_column("total", justify="right", no_wrap=True)
     table.add_column("")
 
     def add(name: str, row: Iterable[float], q: float, total: float, note: str, style: str) -> None:
-        cells = [name, vector(row, decimals), number(q, decimals), amount(total), note]
+        totals = [] if moment.totals is None else [amount(total)]
+        cells = [name, vector(row, decimals), number(q, decimals), *totals, note]
         table.add_row(*(Text(fit(cell, ascii_only=ascii_only)) for cell in cells), style=style)
 
     for i, name in enumerate(moment.action_names):
@@ -64,12 +69,23 @@ def action_table(
     return table
 
 
-def story(explanation: Explanation, *, ascii_only: bool = False) -> RenderableType:
-    """Returns the findings as paragraphs under short headings."""
+def story(
+    explanation: Explanation,
+    *,
+    sections: Collection[str] | None = None,
+    ascii_only: bool = False,
+) -> RenderableType:
+    """Returns the findings as paragraphs under short headings.
+
+    Args:
+        explanation: what is told.
+        sections: the fields of it that are; by default all.
+        ascii_only: for terminals without UTF-8.
+    """
     parts: list[RenderableType] = []
     for field, heading in _SECTIONS:
         findings = getattr(explanation, field)
-        if not findings:
+        if not findings or (sections is not None and field not in sections):
             continue
         title = heading.format(action=explanation.action, foil=explanation.foil)
         parts.append(Text(title[0].upper() + title[1:], style="bold"))

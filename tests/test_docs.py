@@ -249,6 +249,18 @@ def test_the_files_of_a_run_are_those_of_the_table(trained: Path) -> None:
     assert re.findall(r"`(\w+)`", row.split(" | ")[1])[1:] == list(metrics)
 
 
+def test_the_settings_are_those_that_the_numbers_on_the_page_were_made_with() -> None:
+    """If this fails, run the commands of docs/train.md again, and write down what they print."""
+    from trdlab.deep.presets import preset
+
+    config = preset("gym", "CartPole-v1").to_config()
+    names = ("N", "w", "gamma", "agent_steps", "num_envs", "learning_starts", "update_every")
+    assert [config[name] for name in names] == [10, 1, 0.99, 100_000, 8, 1_000, 2]
+    names = ("epsilon_end", "epsilon_steps", "batch_size", "learning_rate", "learning_rate_end")
+    assert [config[name] for name in names] == [0.04, 20_000, 64, 1e-3, 0.0]
+    assert (config["target_sync_updates"], config["hidden"]) == (128, [256, 256])
+
+
 def build(config: Path, site: Path) -> "subprocess.CompletedProcess[str]":
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", config, "-d", site]
     return subprocess.run(command, cwd=config.parent, capture_output=True, text=True, check=False)

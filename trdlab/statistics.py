@@ -13,7 +13,7 @@ RESAMPLES = 10_000
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number and the interval in which it would be found again.
+    """A number from a sample, and an interval for what it estimates.
 
     Args:
         value: of the sample.

@@ -196,8 +196,8 @@ class Trainer:
         """Goes on where `state_dict` was taken, to the bit.
 
         Returns:
-            What went wrong if the environments could not be restored: they have begun new
-            episodes then, and the running ones stand in the memory as truncated.
+            What went wrong if the environments could not be restored, else None. They have begun
+            new episodes then, and the running ones stand in the memory as truncated.
 
         Raises:
             InputError: the state is of a run with other settings.

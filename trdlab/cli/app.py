@@ -12,6 +12,7 @@ HELP = "When does an agent expect which reward, and how far can that be trusted?
 COMMANDS = {
     "gridworld": "trdlab.cli.gridworld",
     "tabular": "trdlab.cli.tabular",
+    "explain": "trdlab.cli.explain",
     "train": "trdlab.cli.train",
     "resume": "trdlab.cli.train",
     "evaluate": "trdlab.cli.train",

@@ -1,4 +1,9 @@
-"""Explanations: an Estimator's decompositions in, findings with their evidence out."""
+"""Explanations: an Estimator's decompositions in, findings with their evidence out.
+
+What plays episodes is imported when it is first asked for: it needs Gymnasium.
+"""
+
+from typing import TYPE_CHECKING
 
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Finding
@@ -6,15 +11,84 @@ from trdlab.explain.flips import find_flips
 from trdlab.explain.moment import Moment, Uncertainty, WhatIf, moment_of
 from trdlab.explain.tabular import gridworld_moment, tabular_moment
 
+if TYPE_CHECKING:
+    from trdlab.explain.agents import Agent, find_agent, gridworld_agent, run_agent
+    from trdlab.explain.assessment import Copying, assess
+    from trdlab.explain.branches import Branches, Branching
+    from trdlab.explain.calibration import Calibration, calibrate
+    from trdlab.explain.ceiling import Ceiling
+    from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
+    from trdlab.explain.counterfactual import Counterfactual, play_to
+    from trdlab.explain.episodes import Counting, Episode, collect
+    from trdlab.explain.trust import trust_findings
+    from trdlab.explain.trust_report import TrustReport, judge
+    from trdlab.explain.trusted import Trust
+
 __all__ = [
+    "Agent",
+    "Branches",
+    "Branching",
+    "Calibration",
+    "Ceiling",
+    "CopyableGymEnvironments",
+    "Copying",
+    "Counterfactual",
+    "Counting",
+    "Episode",
     "Explanation",
     "Finding",
+    "ModelEnvironments",
     "Moment",
+    "Trust",
+    "TrustReport",
     "Uncertainty",
     "WhatIf",
+    "assess",
+    "calibrate",
+    "collect",
     "explain",
+    "find_agent",
     "find_flips",
+    "gridworld_agent",
     "gridworld_moment",
+    "judge",
     "moment_of",
+    "play_to",
+    "run_agent",
     "tabular_moment",
+    "trust_findings",
 ]
+
+_HOMES = {
+    "Agent": "agents",
+    "find_agent": "agents",
+    "gridworld_agent": "agents",
+    "run_agent": "agents",
+    "Copying": "assessment",
+    "assess": "assessment",
+    "Branches": "branches",
+    "Branching": "branches",
+    "Calibration": "calibration",
+    "calibrate": "calibration",
+    "Ceiling": "ceiling",
+    "CopyableGymEnvironments": "copies",
+    "ModelEnvironments": "copies",
+    "Counterfactual": "counterfactual",
+    "play_to": "counterfactual",
+    "Counting": "episodes",
+    "Episode": "episodes",
+    "collect": "episodes",
+    "trust_findings": "trust",
+    "TrustReport": "trust_report",
+    "judge": "trust_report",
+    "Trust": "trusted",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Imports what needs Gymnasium when it is first asked for."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'trdlab.explain' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(f"trdlab.explain.{_HOMES[name]}"), name)

@@ -1,8 +1,45 @@
 """Renderings of explanations: sentences that can be checked, text for a terminal, and pictures.
 
-Pictures live in `trdlab.show.plots`, which imports matplotlib.
+Pictures live in `trdlab.show.plots`, `trdlab.show.trust` and `trdlab.show.explained_plots`, which
+import matplotlib. What is said of agents that play is imported when it is first asked for.
 """
+
+from typing import TYPE_CHECKING
 
 from trdlab.show.sentences import UnsupportedSentenceError, check, sentence, sentences
 
-__all__ = ["UnsupportedSentenceError", "check", "sentence", "sentences"]
+if TYPE_CHECKING:
+    from trdlab.show.explained import Explained, explain_agent, summary
+    from trdlab.show.trust_data import trust_to_dict
+    from trdlab.show.verdicts import check_trust, trust_sentences
+
+__all__ = [
+    "Explained",
+    "UnsupportedSentenceError",
+    "check",
+    "check_trust",
+    "explain_agent",
+    "sentence",
+    "sentences",
+    "summary",
+    "trust_sentences",
+    "trust_to_dict",
+]
+
+_HOMES = {
+    "Explained": "explained",
+    "explain_agent": "explained",
+    "summary": "explained",
+    "trust_to_dict": "trust_data",
+    "check_trust": "verdicts",
+    "trust_sentences": "verdicts",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Imports what needs Gymnasium when it is first asked for."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'trdlab.show' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(f"trdlab.show.{_HOMES[name]}"), name)

@@ -86,7 +86,7 @@ def report_figure(report: Report) -> Figure:
         plot_contrast(axes[-1], moment, action, foil)
         for ax in axes[:-1]:
             ax.label_outer()
-        _share_scale(axes[:-1])
+        share_scale(axes[:-1])
     right.supylabel("expected discounted reward", fontsize=9, color=_MUTED)
     figure.text(
         0.5,
@@ -339,7 +339,8 @@ def _label_steps(ax: Axes, positions: FloatArray, axis: TimeAxis) -> None:
     ax.set_xlabel("agent steps from now (t is the action taken now)", fontsize=9, color=_MUTED)
 
 
-def _share_scale(axes: Sequence[Axes]) -> None:
+def share_scale(axes: Sequence[Axes]) -> None:
+    """Gives all axes the same range of values."""
     low = min(ax.get_ylim()[0] for ax in axes)
     high = max(ax.get_ylim()[1] for ax in axes)
     for ax in axes:

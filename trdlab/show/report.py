@@ -141,17 +141,7 @@ def to_dict(report: Report) -> dict[str, Any]:
         "time_axis": {**asdict(report.table.time_axis), "labels": report.table.time_axis.labels},
         "future": asdict(moment.future),
         "state": {"index": report.state, **report.scene.state},
-        "actions": {
-            name: {
-                "components": moment.components(name).tolist(),
-                "q_value": moment.q_value(name),
-                "undiscounted_total": _or_none(moment.total(name)),
-                "probability": float(report.table.solution.policy[report.state, i]),
-                "changes_state": bool(moment.changes_state and moment.changes_state[i]),
-                **_uncertainty(moment, i),
-            }
-            for i, name in enumerate(moment.action_names)
-        },
+        "actions": actions_to_dict(moment),
         "action": explanation.action,
         "foil": explanation.foil,
         "findings": [
@@ -159,6 +149,21 @@ def to_dict(report: Report) -> dict[str, Any]:
             for finding in explanation.findings
         ],
         "checks": {"sum_error": report.sum_error, "error_bound": report.error_bound},
+    }
+
+
+def actions_to_dict(moment: Moment) -> dict[str, Any]:
+    """Returns what is known of each action as plain data; `null` where something is not."""
+    return {
+        name: {
+            "components": moment.components(name).tolist(),
+            "q_value": moment.q_value(name),
+            "undiscounted_total": _or_none(moment.total(name)),
+            "probability": None if moment.policy is None else float(moment.policy[i]),
+            "changes_state": None if moment.changes_state is None else moment.changes_state[i],
+            **_uncertainty(moment, i),
+        }
+        for i, name in enumerate(moment.action_names)
     }
 
 

@@ -1,0 +1,184 @@
+"""`trdlab explain` as its users see it."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from trdlab.cli import main
+from trdlab.deep.settings import TrainSettings
+from trdlab.training.run import begin, carry_on
+
+Outcome = tuple[int, str, str]
+Trdlab = Callable[..., Outcome]
+
+
+@pytest.fixture
+def trdlab(capsys, monkeypatch, tmp_path) -> Trdlab:
+    """Returns a function that runs `trdlab explain`: exit code, stdout as one line, stderr."""
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: object) -> Outcome:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main(["explain", *map(str, words)])
+        out, err = capsys.readouterr()
+        return int(end.value.code or 0), out, err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory) -> Path:
+    """Returns a run; not to be changed."""
+    out = tmp_path_factory.mktemp("runs") / "drone"
+    lines: dict[str, Any] = {
+        "agent_steps": 1500,
+        "learning_starts": 100,
+        "gamma": 0.95,
+        "N": 4,
+        "hidden": [16],
+        "clip_rewards": True,
+        "env_arg": ["slip=0.2"],
+    }
+    threads = torch.get_num_threads()
+    settings = TrainSettings("gym", "trdlab/DroneGridworld-v0").changed(lines)
+    with begin(settings, out) as run:
+        carry_on(run)
+    torch.set_num_threads(threads)
+    return out
+
+
+def test_without_options_it_says_what_matters_most_and_where_pictures_went(trdlab, tmp_path):
+    code, out, err = trdlab("gridworld:drone", "--episodes", 40)
+    assert code == 0
+    assert "drone · step 0 of the episode with seed 0 · down or up" in out
+    assert "the future of the optimal policy" in out
+    assert "The forecast can be trusted over its whole horizon, to t+3." in out
+    assert "down is worth 3.52 and up 3.26." in out
+    names = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png", "calibration.png"]
+    paths = [Path("explanations") / "drone" / name for name in names]
+    assert err.splitlines() == [f"Picture: {path}" for path in paths]
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
+    trdlab("gridworld:drone", "--episodes", 40)
+    assert (tmp_path / "explanations" / "drone-2" / "calibration.png").exists()
+
+
+def test_a_contrast_at_a_step_with_named_and_numbered_actions(trdlab):
+    code, out, err = trdlab(
+        "gridworld:ledge", "--what", "contrast", "--step", 1, "--action", "up", "--foil", 3
+    )
+    assert (code, err) == (0, "")
+    assert "ledge · step 1 of the episode with seed 0 · up or right" in out
+    assert "With γ = 0.95 right is worth 0.84 and up 0.80." in out
+    assert "How far to trust it" in out
+    assert "first expected to cost" not in out  # that is the forecast
+
+
+def test_a_calibration_as_text_and_as_json(trdlab):
+    _, out, err = trdlab("gridworld:ledge", "--what", "calibration", "--N", 3, "--gamma", 0.9)
+    assert "γ = 0.9, N = 3, w = 1" in out
+    assert "The forecast can be trusted over its whole horizon, to t+2." in out
+    assert err == ""
+    code, out, _ = trdlab("gridworld:ledge", "--what", "calibration", "--json", "--episodes", 50)
+    data = json.loads(out)
+    assert code == 0
+    assert data["schema"] == "trdlab.explain/1"
+    assert data["calibration"]["schema"] == "trdlab.trust/1"
+    assert data["calibration"]["episodes"] == 50
+    assert not Path("explanations").exists()
+
+
+def test_a_map_file_is_an_agent_too(trdlab, tmp_path):
+    file = tmp_path / "mine.txt"
+    file.write_text("S..C\n", encoding="utf-8")
+    code, out, _ = trdlab(file, "--what", "forecast", "--N", 3, "--episodes", 0)
+    assert code == 0
+    assert "The first reward to be expected of right is that of t+2: 1 on average" in out
+    assert "How far to trust it" not in out
+
+
+def test_a_run_is_explained_by_its_own_rewards(trdlab, trained):
+    code, out, _ = trdlab(trained, "--what", "forecast,calibration", "--json", "--episodes", 30)
+    data = json.loads(out)
+    assert code == 0
+    assert data["agent"] == "drone"
+    assert data["future"]["policy"] == "the greedy policy of the network"
+    assert data["future"]["reward"] == "sign of each reward"
+    assert list(data["moment"]["actions"]) == ["up", "down", "left", "right"]
+    chances = [action["probability"] for action in data["moment"]["actions"].values()]
+    assert sorted(chances) == [0.0, 0.0, 0.0, 1.0]
+    assert max(data["calibration"]["calibration"]["mean"]) <= 1.0  # and not 4, the treasure
+    assert data["calibration"]["ceiling"]["num_moments"] > 20
+    _, again, _ = trdlab(trained, "--what", "forecast,calibration", "--json", "--episodes", 30)
+    assert again == out
+
+
+def test_a_run_says_how_long_a_step_is(trdlab, trained):
+    _, out, _ = trdlab(trained, "--episodes", 12, "--out", "pictures")
+    assert "a step is 0.25 s of play" in out
+    assert "sign of each reward" in out
+    assert len(list(Path("pictures").iterdir())) == 3
+
+
+def test_a_run_in_another_environment(trdlab, trained):
+    same = ("--env", "trdlab/DroneGridworld-v0", "--env-arg", "slip=0.9")
+    code, out, _ = trdlab(trained, *same, "--what", "calibration", "--episodes", 12)
+    assert code == 0
+    assert "It was judged by 12 episodes" in out
+    for env, why in (
+        ("trdlab/LedgeGridworld-v0", "its observations are 8 states, those of the agent 14 states"),
+        ("CartPole-v1", "its observations are 4 float32, those of the agent 14 states"),
+        ("Acrobt-v1", "There is no environment 'Acrobt-v1'. Did you mean 'Acrobot-v1'?"),
+    ):
+        code, _, err = trdlab(trained, "--env", env)
+        assert (code, err.count("\n")) == (2, 1)
+        assert why in err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--step", "99"], "There is no step 99: the episode is over after 5 steps."),
+        (["--action", "dwn"], "There is no action 'dwn'. Did you mean 'down'?"),
+        (["--foil", "7"], "There is no action '7'. Known: down, left, right, up."),
+        (["--action", "up", "--foil", "0"], "Action and foil are both 'up'."),
+        (["--what", "contrst"], "There is no explanation 'contrst'. Did you mean 'contrast'?"),
+        (["--what", "calibration", "--episodes", "0"], "A calibration needs episodes."),
+        (["--env", "CartPole-v1"], "'CartPole-v1' is no gridworld"),
+        (["--checkpoint", "5"], "--checkpoint is for runs"),
+        (["--N", "-1"], "horizon N"),
+    ],
+)
+def test_refusals_are_one_clear_line(trdlab, words, message):
+    code, out, err = trdlab("gridworld:drone", *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert not Path("explanations").exists()
+
+
+def test_nothing_is_overwritten(trdlab):
+    Path("pictures").mkdir()
+    Path("pictures/calibration.png").write_text("mine", encoding="utf-8")
+    code, out, err = trdlab("gridworld:drone", "--what", "calibration", "--out", "pictures")
+    assert (code, out) == (2, "")
+    assert "The picture 'pictures/calibration.png' exists." in err
+    assert Path("pictures/calibration.png").read_text(encoding="utf-8") == "mine"
+    code, _, err = trdlab("gridworld:drone", "--out", "pictures/calibration.png")
+    assert (code, "is a file" in err) == (2, True)
+
+
+def test_a_gridworld_is_explained_without_pytorch(tmp_path):
+    code = (
+        "import sys; from trdlab.cli import main\n"
+        "try: main(['explain', 'gridworld:drone', '--episodes', '20'])\n"
+        "except SystemExit as end: assert not end.code\n"
+        "assert 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True)

@@ -1,0 +1,161 @@
+"""Agents: named, played, and judged by what came."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.environments import Environments
+from trdlab.errors import InputError
+from trdlab.explain import (
+    Agent,
+    CopyableGymEnvironments,
+    Copying,
+    assess,
+    explain,
+    find_agent,
+    gridworld_agent,
+)
+from trdlab.show import check, sentences
+from trdlab.tabular import ExactTable
+
+AXIS = TimeAxis(0.95, 4)
+
+
+def slippery(tmp_path: Path, slip: float) -> str:
+    path = tmp_path / f"drone-{slip}.txt"
+    path.write_text(f"slip: {slip}\n---\n>...T\nS####\n>cccC\n", encoding="utf-8")
+    return str(path)
+
+
+def test_an_exact_table_is_trusted_over_its_whole_horizon():
+    report = assess(gridworld_agent("ledge", AXIS), episodes=300, copying=Copying())
+    assert report.trust.is_whole
+    assert report.epsilon == 0.0
+    assert report.blame is not None
+    assert report.blame.shift == 0
+    assert not report.faults
+    assert report.ceiling is not None
+    skill, limit = report.calibration.skill, report.ceiling.skill
+    assert (skill.low <= limit.high)[:-1].all()
+    assert (limit.low <= skill.high)[:-1].all()
+
+
+def test_where_all_episodes_are_the_same_some_actions_are_random():
+    report = assess(gridworld_agent("drone", AXIS), episodes=60, copying=Copying())
+    assert report.epsilon == 1.0 / 6.0
+    assert report.trust.is_whole
+    assert report.calibration.error.value[:-1].max() == pytest.approx(0.0, abs=1e-20)
+    assert report.ceiling is not None
+    assert report.ceiling.deterministic
+    told = assess(gridworld_agent("drone", AXIS), episodes=60, epsilon=0.0)
+    assert told.epsilon == 0.0
+    assert told.trust.last_step is None
+    assert set(told.calibration.states) == {"too few episodes"}
+
+
+def test_another_environment_shows_what_a_model_leaves_out(tmp_path):
+    own, other = (slippery(tmp_path, slip) for slip in (0.0, 0.3))
+    at_home = assess(gridworld_agent(own, AXIS), episodes=100)
+    abroad = assess(gridworld_agent(own, AXIS, env=other), episodes=100)
+    assert at_home.trust.is_whole
+    assert not abroad.trust.is_whole
+    with pytest.raises(InputError, match="'gridworld:ledge' does not fit the agent: it has 8 "):
+        gridworld_agent(own, AXIS, env="gridworld:ledge")
+    with pytest.raises(InputError, match="'CartPole-v1' is no gridworld"):
+        gridworld_agent(own, AXIS, env="CartPole-v1")
+
+
+def test_what_is_wrong_from_some_step_on_is_marked_in_every_explanation():
+    agent = gridworld_agent("ledge", TimeAxis(0.95, 4))
+    table = agent.estimator
+    assert isinstance(table, ExactTable)
+    components = table.decomposition.components.copy()
+    components[..., 2:] += np.random.default_rng(0).normal(size=components[..., 2:].shape)
+    wrong = replace(table, decomposition=RewardDecomposition(components, AXIS))
+    agent = replace(agent, estimator=wrong)
+    trust = assess(agent, episodes=200).trust
+    assert trust.last_step == 1
+    assert trust.doubtful.tolist() == [False, False, True, True, True]
+    explanation = explain(replace(agent.moment(), trust=trust))
+    said = "From t+2 on such forecasts have not proved better than a guess."
+    assert said in sentences(explanation)
+    check(said, explanation)
+    assert "guess" not in " ".join(sentences(explain(agent.moment())))
+
+
+class Once(gym.Env):
+    """An environment of one step that pays 1; copies of it can be forbidden."""
+
+    observation_space = gym.spaces.Discrete(1)
+    action_space = gym.spaces.Discrete(2)
+
+    def __init__(self, copyable: bool = True) -> None:
+        self.copyable = copyable
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return 0, {}
+
+    def step(self, action):
+        return 0, 1.0, True, False, {}
+
+    def __deepcopy__(self, memo):
+        if not self.copyable:
+            raise TypeError("no")
+        return Once()
+
+
+@pytest.mark.parametrize("copyable", [True, False])
+def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatch):
+    monkeypatch.setitem(gym.registry, "Once-v0", gym.envs.registration.EnvSpec("Once-v0", Once))
+    drone = gridworld_agent("drone", AXIS)
+
+    def make(num_envs: int, seed: int) -> Environments:
+        made = {"copyable": copyable}
+        return CopyableGymEnvironments("Once-v0", num_envs, seed=seed, env_arguments=made)
+
+    agent = Agent("once", drone.estimator, ("wait", "take"), make)
+    report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
+    assert (report.ceiling is not None) == copyable
+
+
+def test_moments_are_steps_of_the_agents_own_episodes():
+    agent = gridworld_agent("drone", AXIS)
+    first, second = agent.moment(), agent.moment(step=1)
+    assert first.q_value("down") == pytest.approx(0.95 + 0.95**2 + 0.95**3 + 0.95**4)
+    assert second.q_value("right") == pytest.approx(1.0 + 0.95 + 0.95**2 + 0.95**3)
+    with pytest.raises(InputError, match="no step 5: the episode is over after 5 steps"):
+        agent.moment(step=5)
+    with pytest.raises(InputError, match="The step is -1"):
+        agent.moment(step=-1)
+
+
+def test_actions_are_named_or_numbered():
+    agent = gridworld_agent("drone", AXIS)
+    assert [agent.action(name) for name in ("up", "1", "9")] == ["up", "down", "9"]
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "message"),
+    [
+        ("drone", {}, "no run 'drone'. For the map: gridworld:drone"),
+        ("gridworld:dron", {}, "Did you mean 'drone'"),
+        ("gridworld:drone", {"step": 3}, "--checkpoint is for runs"),
+        ("gridworld:drone", {"env_arguments": ["a=1"]}, "--env-arg is for runs"),
+        ("runs/none", {}, "There is no 'runs/none'"),
+        ("runs/none", {"time_axis": AXIS}, "A run has its own"),
+    ],
+)
+def test_agents_that_cannot_be_found(name, given, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=message):
+        find_agent(name, **given)
+
+
+def test_an_agent_needs_an_episode_to_be_judged_by():
+    with pytest.raises(InputError, match="There are 0 episodes"):
+        assess(gridworld_agent("drone", AXIS), episodes=0)

@@ -1,0 +1,119 @@
+"""An explained agent, as text, as plain data, and drawn."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from trdlab.decomposition import TimeAxis
+from trdlab.errors import InputError
+from trdlab.explain import gridworld_agent
+from trdlab.show import check, check_trust, explain_agent, summary
+from trdlab.show.explained import Explained, Part, parse_parts, to_dict
+from trdlab.show.explained_plots import moment_figure, part_figure, picture_paths
+from trdlab.show.sentences import UnsupportedSentenceError
+
+
+@cache
+def explained(name: str = "ledge", parts: tuple[Part, ...] = (), step: int = 0) -> Explained:
+    agent = gridworld_agent(name, TimeAxis(0.95, 4))
+    return explain_agent(agent, parts, step=step, episodes=100)
+
+
+@pytest.mark.parametrize("name", ["drone", "ledge", "loop"])
+def test_every_sentence_of_a_summary_is_supported(name):
+    found = explained(name)
+    texts = summary(found)
+    assert found.explanation is not None
+    assert found.report is not None
+    for text in texts:
+        try:
+            check(text, found.explanation)
+        except UnsupportedSentenceError:
+            check_trust(text, found.report)
+    assert 4 <= len(texts) <= 8
+    assert texts[0].startswith("After the first action it is the future of the optimal policy")
+    assert texts[1].startswith("The forecast can be trusted ")
+
+
+def test_a_summary_says_what_is_promised_and_why_not_the_next_best():
+    text = " ".join(summary(explained("drone")))
+    assert "first reward to be expected of down is that of t+1: 1 on average" in text
+    assert "with γ = 0.95 down is worth 3.52 and up 3.26." in text
+    assert "Down gives more immediate rewards than up" in text
+
+
+def test_the_plain_data_has_the_numbers_and_their_sentences():
+    found = explained(parts=("contrast", "calibration"), step=1)
+    data = json.loads(json.dumps(to_dict(found), allow_nan=False))
+    assert data["schema"] == "trdlab.explain/1"
+    assert data["time_axis"]["labels"] == ["t", "t+1", "t+2", "t+3", "t+4…∞"]
+    moment, calibration = data["moment"], data["calibration"]
+    assert (moment["seed"], moment["step"]) == (0, 1)
+    for action in moment["actions"].values():
+        assert sum(action["components"]) == pytest.approx(action["q_value"])
+    kinds = [finding["kind"] for finding in moment["findings"]]
+    assert "better" in kinds
+    assert "first-step-cost" not in kinds  # that is of the forecast
+    assert calibration["schema"] == "trdlab.trust/1"
+    assert calibration["episodes"] == 100
+    assert found.report is not None
+    np.testing.assert_array_equal(
+        np.array(calibration["calibration"]["skill"]["low"], dtype=float),
+        found.report.calibration.skill.low,
+    )
+    assert len(calibration["ceiling"]["skill"]["value"]) == 5
+    assert calibration["trusted"]["last_step"] == found.report.trust.last_step
+    text = " ".join(finding["sentence"] for finding in calibration["findings"])
+    assert len(check_trust(text, found.report)) == len(calibration["findings"])
+
+
+def test_what_was_not_asked_for_is_null():
+    agent = gridworld_agent("drone", TimeAxis(0.95, 4))
+    forecast = to_dict(explain_agent(agent, ("forecast",), episodes=0))
+    assert forecast["calibration"] is None
+    kinds = {finding["kind"] for finding in forecast["moment"]["findings"]}
+    assert "first-step-reward" in kinds
+    assert not {"better", "better-by-discount", "not-trusted-at"} & kinds
+    assert to_dict(explained(parts=("calibration",)))["moment"] is None
+
+
+def test_bars_that_are_not_to_be_trusted_are_faded():
+    found = explained("ledge")
+    explanation, report = found.explanation, found.report
+    assert explanation is not None
+    assert report is not None
+    trust = replace(report.trust, components=2, residual=True)
+    moment = replace(explanation.moment, trust=trust)
+    figure = moment_figure(replace(explanation, moment=moment), explanation.foil, "ledge")
+    figure.canvas.draw()
+    for ax in [ax for ax in figure.axes if ax.patches]:
+        alpha = [bar.get_alpha() for bar in ax.patches]
+        assert [a is not None for a in alpha] == [False, False, True, True, False]
+    assert "faded" in figure.texts[-1].get_text()
+
+
+def test_there_is_a_picture_only_of_what_there_is():
+    found = explained(parts=("calibration",))
+    assert part_figure(found, "forecast") is None
+    assert part_figure(found, "contrast") is None
+    assert part_figure(found, "calibration") is not None
+
+
+def test_pictures_are_named_by_what_they_show(tmp_path):
+    paths = picture_paths(tmp_path / "new", (), seed=3, step=7)
+    names = [path.name for path in paths.values()]
+    assert names == [
+        "forecast-seed-3-step-7.png",
+        "contrast-seed-3-step-7.png",
+        "calibration.png",
+    ]
+
+
+def test_parts_are_named():
+    assert parse_parts(None) == ()
+    assert parse_parts("calibration, contrast") == ("contrast", "calibration")
+    with pytest.raises(InputError, match=r"no explanation 'contrst'\. Did you mean 'contrast'"):
+        parse_parts("forecast,contrst")

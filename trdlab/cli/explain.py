@@ -1,0 +1,145 @@
+"""`trdlab explain`: what an agent expects, and how far that can be trusted."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from trdlab.cli import common
+
+
+def explain(
+    agent: Annotated[
+        str,
+        typer.Argument(
+            metavar="AGENT",
+            help="A run's folder; or gridworld:NAME or a map file, for the exact table of it.",
+        ),
+    ],
+    what: Annotated[
+        str | None,
+        typer.Option(
+            "--what",
+            metavar="PART,...",
+            help="forecast, contrast, calibration.",
+            show_default="what matters most",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the episode to explain.")] = 0,
+    step: Annotated[int, typer.Option("--step", min=0, help="Of that episode.")] = 0,
+    action: Annotated[
+        str | None,
+        typer.Option(
+            "--action", metavar="NAME|NUMBER", help="To explain.", show_default="what it does"
+        ),
+    ] = None,
+    foil: Annotated[
+        str | None,
+        typer.Option(
+            "--foil",
+            metavar="NAME|NUMBER",
+            help="The action to contrast it with.",
+            show_default="the next best",
+        ),
+    ] = None,
+    env: Annotated[
+        str | None,
+        typer.Option("--env", help="Where it acts.", show_default="where it was made for"),
+    ] = None,
+    env_arguments: Annotated[
+        list[str] | None,
+        typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
+    ] = None,
+    gamma: Annotated[
+        float | None,
+        typer.Option("--gamma", help="Of an exact table: discount factor.", show_default="0.95"),
+    ] = None,
+    horizon: Annotated[
+        int | None,
+        typer.Option("--N", help="Of an exact table: explicit components.", show_default="4"),
+    ] = None,
+    width: Annotated[
+        int | None,
+        typer.Option("--w", help="Of an exact table: steps in each.", show_default="1"),
+    ] = None,
+    checkpoint: Annotated[
+        int | None,
+        typer.Option("--checkpoint", metavar="STEP", help="Of a run.", show_default="the newest"),
+    ] = None,
+    episodes: Annotated[
+        int | None,
+        typer.Option(
+            "--episodes",
+            min=0,
+            help="To judge it by; 0 for not at all.",
+            show_default="50, of an exact table 300",
+        ),
+    ] = None,
+    as_json: common.AsJson = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Write pictures there.",
+            show_default="without --what and --json a new folder in explanations",
+        ),
+    ] = None,
+    verbose: common.Verbose = False,
+) -> None:
+    """Say what an agent expects, when, and how far that can be trusted.
+
+    It plays an episode as the agent would, and explains one step of it. How far such forecasts can
+    be trusted is judged by other episodes.
+    """
+    from trdlab.cli.progress import EpisodeProgress
+    from trdlab.decomposition import TimeAxis
+    from trdlab.explain.agents import find_agent
+    from trdlab.show import explained as show
+
+    parts = show.parse_parts(what)
+    own_axis = gamma is not None or horizon is not None or width is not None
+    found = find_agent(
+        agent,
+        time_axis=TimeAxis(
+            0.95 if gamma is None else gamma,
+            4 if horizon is None else horizon,
+            1 if width is None else width,
+        )
+        if own_axis
+        else None,
+        step=checkpoint,
+        env=env,
+        env_arguments=env_arguments or (),
+    )
+    if out is None and not parts and not as_json:
+        from trdlab.runs import free_name
+
+        out = free_name(Path("explanations"), found.name)
+    if out is not None:
+        from trdlab.show.explained_plots import picture_paths
+
+        paths = picture_paths(out, parts, seed=seed, step=step)
+    errors = Console(stderr=True, highlight=False)
+    with EpisodeProgress(errors) as progress:
+        explained = show.explain_agent(
+            found,
+            parts,
+            seed=seed,
+            step=step,
+            action=action,
+            foil=foil,
+            episodes=episodes,
+            on_episode=progress.on_episode,
+        )
+    if as_json:
+        common.print_json(show.to_dict(explained))
+    else:
+        console, ascii_only = common.new_console()
+        console.print(show.page(explained, ascii_only=ascii_only))
+    if out is not None:
+        from trdlab.show.explained_plots import write_pictures
+
+        for path in write_pictures(explained, paths):
+            errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

@@ -1,0 +1,265 @@
+"""An agent explained: what it expects at a moment, how far to trust that; as text or plain data."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal, get_args
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from trdlab.errors import InputError, closest
+from trdlab.explain.agents import Agent
+from trdlab.explain.assessment import Copying, assess
+from trdlab.explain.explanation import Explanation, explain
+from trdlab.explain.finding import Finding
+from trdlab.explain.trust import trust_findings
+from trdlab.explain.trust_report import TrustReport
+from trdlab.formatting import plain
+from trdlab.show.report import actions_to_dict
+from trdlab.show.sentences import sentence
+from trdlab.show.text import action_table, fit, story
+from trdlab.show.trust_data import trust_to_dict
+from trdlab.show.verdicts import trust_sentence
+from trdlab.time_axis import TimeAxis, axis_title
+
+Part = Literal["forecast", "contrast", "calibration"]
+PARTS: tuple[Part, ...] = get_args(Part)
+SCHEMA = "trdlab.explain/1"
+
+_FIELDS: dict[Part, tuple[str, ...]] = {
+    "forecast": ("forecast", "limits", "context"),
+    "contrast": ("contrast", "flips", "limits", "context"),
+    "calibration": (),
+}
+_FAULTS = (
+    "too-late",
+    "too-early",
+    "amount-off",
+    "discount-off",
+    "goes-on-in-next",
+    "goes-on-after-end",
+)
+_MATTERS_MOST = (
+    "equal-values",
+    "better",
+    "better-by-discount",
+    "same-components",
+    "dominates",
+    "more-immediate",
+    "less-costly",
+    "overtakes",
+)
+_MOST_OF_EACH = 2  # sentences of a kind, where only what matters most is told
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """An agent at one moment, and how far its forecasts can be trusted.
+
+    Args:
+        agent: whom it is about.
+        parts: what was asked for; nothing, if only what matters most is told.
+        seed: of the episode that the moment is in.
+        step: of that episode.
+        explanation: of the moment; None where only the calibration was asked for.
+        report: how far forecasts can be trusted; None where no episodes were played.
+    """
+
+    agent: Agent
+    parts: tuple[Part, ...]
+    seed: int
+    step: int
+    explanation: Explanation | None
+    report: TrustReport | None
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """What the components mean."""
+        return self.agent.estimator.time_axis
+
+
+def parse_parts(text: str | None) -> tuple[Part, ...]:
+    """Returns the parts that are written with commas between them, in a fixed order.
+
+    Raises:
+        InputError: there is no such part.
+
+    >>> parse_parts("calibration,forecast")
+    ('forecast', 'calibration')
+    """
+    words = [] if text is None else [word.strip() for word in text.split(",")]
+    for word in words:
+        if word not in PARTS:
+            raise InputError(f"There is no explanation '{word}'.", closest(word, PARTS))
+    return tuple(part for part in PARTS if part in words)
+
+
+def explain_agent(
+    agent: Agent,
+    parts: tuple[Part, ...] = (),
+    *,
+    seed: int = 0,
+    step: int = 0,
+    action: str | None = None,
+    foil: str | None = None,
+    episodes: int | None = None,
+    on_episode: Callable[[int], None] = lambda finished: None,
+) -> Explained:
+    """Explains an agent at a step of an episode of its own, and judges it by other episodes.
+
+    Args:
+        agent: whom to explain.
+        parts: what is asked for; without any, what matters most of all.
+        seed: of the episode that the moment is in.
+        step: of that episode.
+        action: the name or number of the action to explain, by default what the policy does.
+        foil: of the one to contrast it with, by default the best other one.
+        episodes: by how many the forecasts are judged, 0 for not at all; by default 300 of an exact
+            table and 50 of another agent.
+        on_episode: called with the number of finished episodes whenever some finish.
+
+    Raises:
+        InputError: the episode has no such step, there is no such action, or no episode to judge
+            by where calibration was asked for.
+    """
+    wanted = parts or PARTS
+    moment = None if wanted == ("calibration",) else agent.moment(seed=seed, step=step)
+    chosen = None if action is None else agent.action(action)
+    other = None if foil is None else agent.action(foil)
+    pair = None if moment is None else moment.pair(chosen, other)  # fails before what takes long
+    if "contrast" in parts and pair is not None and pair[1] is None:
+        raise InputError("There is no other action to contrast it with.", "Ask for --what forecast")
+    count = (50 if agent.world is None else 300) if episodes is None else episodes
+    if "calibration" in parts and count == 0:
+        raise InputError("A calibration needs episodes.", "Ask for --episodes 50.")
+    copying = Copying() if "calibration" in wanted else None
+    report = (
+        assess(agent, episodes=count, copying=copying, on_episode=on_episode) if count else None
+    )
+    explanation = None
+    if moment is not None and pair is not None:
+        trusted = replace(moment, trust=None if report is None else report.trust)
+        explanation = explain(trusted, *pair)
+    return Explained(agent, parts, seed, step, explanation, report)
+
+
+def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
+    """Returns the explanation as text: what was asked for, or what matters most.
+
+    Args:
+        explained: what is told.
+        ascii_only: for terminals without UTF-8.
+    """
+    lines: list[RenderableType] = []
+
+    def add(text: str, style: str = "", indent: int = 0) -> None:
+        line = Text(fit(text, ascii_only=ascii_only), style=style)
+        lines.append(Padding(line, (0, 0, 0, indent)))
+
+    add(_heading(explained), "bold")
+    add(_setting(explained), "dim")
+    add("")
+    if not explained.parts:
+        for text in summary(explained):
+            add(text)
+        return Group(*lines)
+    explanation = explained.explanation
+    if explanation is not None:
+        is_contrast = "contrast" in explained.parts
+        foil = explanation.foil if is_contrast else None
+        add("Expected discounted reward of each action, by the step it is expected at")
+        moment, action = explanation.moment, explanation.action
+        lines.append(action_table(moment, action, foil, ascii_only=ascii_only))
+        add("")
+        lines.append(story(explanation, sections=_fields(explained), ascii_only=ascii_only))
+    if "calibration" in explained.parts and explained.report is not None:
+        add("How far its forecasts can be trusted", "bold")
+        for text in _trust(explained.report):
+            add(text, indent=2)
+    return Group(*lines)
+
+
+def summary(explained: Explained) -> list[str]:
+    """Returns the few sentences that matter most.
+
+    Whose future it is, how far it can be trusted and why no further, what the action promises, and
+    why not the next best.
+    """
+    texts: list[str] = []
+    explanation, report = explained.explanation, explained.report
+    if explanation is not None:
+        texts += _told(explanation.context[:1], explanation)
+    if report is not None:
+        found = trust_findings(report)
+        shown = [x for i, x in enumerate(found) if i < _MOST_OF_EACH or x.kind() in _FAULTS]
+        texts += [trust_sentence(finding, report) for finding in shown]
+    if explanation is not None:
+        texts += _told(explanation.forecast[:_MOST_OF_EACH], explanation)
+        most = [finding for finding in explanation.contrast if finding.kind() in _MATTERS_MOST]
+        most.sort(key=lambda finding: _MATTERS_MOST.index(finding.kind()))
+        texts += _told(most[:_MOST_OF_EACH], explanation)
+    return texts
+
+
+def to_dict(explained: Explained) -> dict[str, Any]:
+    """Returns the explanation as plain data at full precision.
+
+    The schema is `trdlab.explain/1`: what was not asked for, and what is not known, is `null`.
+    """
+    explanation, report, axis = explained.explanation, explained.report, explained.time_axis
+    moment = None
+    if explanation is not None:
+        moment = {
+            "seed": explained.seed,
+            "step": explained.step,
+            "actions": actions_to_dict(explanation.moment),
+            "action": explanation.action,
+            "foil": explanation.foil,
+            "findings": [
+                finding.to_dict() | {"sentence": sentence(finding, explanation)}
+                for field in _fields(explained)
+                for finding in getattr(explanation, field)
+            ],
+        }
+    return {
+        "schema": SCHEMA,
+        "agent": explained.agent.name,
+        "time_axis": {**asdict(axis), "labels": axis.labels},
+        "future": asdict(explained.agent.estimator.future),
+        "summary": summary(explained),
+        "moment": moment,
+        "calibration": None if report is None else trust_to_dict(report),
+    }
+
+
+def _fields(explained: Explained) -> tuple[str, ...]:
+    """Returns the fields of the explanation that are told, each once."""
+    named = (field for part in explained.parts or PARTS for field in _FIELDS[part])
+    return tuple(dict.fromkeys(named))
+
+
+def _heading(explained: Explained) -> str:
+    explanation = explained.explanation
+    words = [explained.agent.name]
+    if explanation is not None:
+        words.append(f"step {explained.step} of the episode with seed {explained.seed}")
+        foil = f" or {explanation.foil}" if explanation.foil is not None else ""
+        words.append(f"{explanation.action}{foil}")
+    return " · ".join(words)
+
+
+def _setting(explained: Explained) -> str:
+    words = [axis_title(explained.time_axis)]
+    seconds = explained.agent.seconds_per_step
+    if seconds is not None:
+        words.append(f"a step is {plain(seconds)} s of play")
+    return " · ".join(words)
+
+
+def _told(findings: Sequence[Finding], explanation: Explanation) -> list[str]:
+    return [sentence(finding, explanation) for finding in findings]
+
+
+def _trust(report: TrustReport) -> list[str]:
+    return [trust_sentence(finding, report) for finding in trust_findings(report)]

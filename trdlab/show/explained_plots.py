@@ -1,0 +1,160 @@
+"""Pictures of an explained agent: what it expects, what cannot be trusted of that, and why."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from trdlab.errors import OutputError
+from trdlab.explain.explanation import Explanation
+from trdlab.explain.moment import Moment
+from trdlab.explain.trust_report import TrustReport
+from trdlab.files import check_output, write_whole
+from trdlab.show.explained import PARTS, Explained, Part
+from trdlab.show.plots import plot_components, plot_contrast, plot_uncertainty, share_scale
+from trdlab.show.trust import plot_trust
+from trdlab.time_axis import axis_title
+
+_COLOURS = ("#1f4e8c", "#e39a2d")  # dark for the action, light for its foil
+_MUTED = "#5b6470"
+_FADED = 0.25
+_WIDTH = 8.0
+_PANEL = 2.2
+_FOOT = 0.5  # inches
+
+
+def picture_paths(
+    folder: Path, parts: tuple[Part, ...], *, seed: int, step: int
+) -> dict[Part, Path]:
+    """Returns where the picture of each part goes, once it is known that it can be written.
+
+    Args:
+        folder: where to; it is made if there is none.
+        parts: what was asked for; nothing stands for all.
+        seed: of the episode that is explained.
+        step: of that episode.
+
+    Raises:
+        OutputError: one of them exists, or cannot be written.
+    """
+    moment = f"-seed-{seed}-step-{step}"
+    names = {part: part + ("" if part == "calibration" else moment) for part in parts or PARTS}
+    paths = {part: folder / f"{name}.png" for part, name in names.items()}
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"'{folder}' is a file.", "Name a folder for the pictures.")
+    for path in paths.values() if folder.is_dir() else ():
+        if path.exists():
+            raise OutputError(f"The picture '{path}' exists.", "Choose another --out.")
+        check_output(path, (".png",))
+    return paths
+
+
+def write_pictures(explained: Explained, paths: dict[Part, Path]) -> list[Path]:
+    """Writes the pictures of an explained agent, and returns their paths.
+
+    Args:
+        explained: what is drawn; what it does not have is left out.
+        paths: where each picture goes.
+
+    Raises:
+        OutputError: one cannot be written.
+    """
+    written = []
+    for part, path in paths.items():
+        figure = part_figure(explained, part)
+        if figure is None:
+            continue
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(
+                f"Cannot make the folder '{path.parent}': {error.strerror or error}.",
+                "Choose another --out.",
+            ) from error
+        write_whole(path, partial(figure.savefig, dpi=160))
+        written.append(path)
+    return written
+
+
+def part_figure(explained: Explained, part: Part) -> Figure | None:
+    """Returns the picture of a part; None where there is nothing to draw."""
+    explanation, report = explained.explanation, explained.report
+    if part == "calibration":
+        return None if report is None else trust_figure(report, explained.agent.name)
+    if explanation is None or (part == "contrast" and explanation.foil is None):
+        return None
+    foil = explanation.foil if part == "contrast" else None
+    title = f"{explained.agent.name}, step {explained.step} of the episode with seed"
+    return moment_figure(explanation, foil, f"{title} {explained.seed}")
+
+
+def moment_figure(explanation: Explanation, foil: str | None, title: str) -> Figure:
+    """Returns the bars of an action; with a foil, those of both and of their difference.
+
+    What is not to be trusted is faded.
+    """
+    moment, action = explanation.moment, explanation.action
+    names = [action] if foil is None else [action, foil]
+    panels = len(names) + (foil is not None)
+    height = 1.3 + _PANEL * panels
+    layout = ConstrainedLayoutEngine(rect=(0.0, _FOOT / height, 1.0, 1.0 - _FOOT / height))
+    figure = Figure(figsize=(_WIDTH, height), layout=layout)
+    figure.suptitle(title, fontsize=11)
+    axes: list[Axes] = list(np.atleast_1d(figure.subplots(panels, 1, sharex=True)))
+    for ax, name, colour in zip(axes, names, _COLOURS, strict=False):
+        plot_components(ax, moment.components(name), moment.time_axis, colour=colour)
+        plot_uncertainty(ax, moment, name)
+        ax.set_title(f"{name}: worth {moment.q_value(name):.3g} in all", fontsize=10, loc="left")
+    if foil is not None:
+        plot_contrast(axes[-1], moment, action, foil)
+        share_scale(axes[:-1])
+    for ax in axes:
+        fade(ax, moment)
+        if ax is not axes[-1]:
+            ax.label_outer()
+    figure.supylabel("expected discounted reward", fontsize=9, color=_MUTED)
+    _foot(figure, moment, height)
+    return figure
+
+
+def fade(ax: Axes, moment: Moment) -> Axes:
+    """Fades those bars of a moment that are not to be trusted; the axes hold one per component.
+
+    Args:
+        ax: the axes with the bars, as `plot_components` draws them.
+        moment: whose `trust` says which; without it nothing is faded.
+
+    Returns:
+        `ax`.
+    """
+    trust = moment.trust
+    if trust is not None:
+        for bar, is_doubtful in zip(ax.patches, trust.doubtful, strict=True):
+            if is_doubtful:
+                bar.set_alpha(_FADED)
+    return ax
+
+
+def trust_figure(report: TrustReport, title: str) -> Figure:
+    """Returns the skill of every component, and how far a forecast can be trusted."""
+    figure = Figure(figsize=(_WIDTH, 4.0), layout="constrained")
+    figure.suptitle(f"{title}: how far its forecasts can be trusted", fontsize=11)
+    plot_trust(figure.subplots(), report)
+    return figure
+
+
+def _foot(figure: Figure, moment: Moment, height: float) -> None:
+    future, trust = moment.future, moment.trust
+    is_faded = trust is not None and bool(trust.doubtful.any())
+    faded = " · faded: has not proved better than a guess" if is_faded else ""
+    lines = (
+        f"{axis_title(moment.time_axis)}{faded}",
+        f"after the first action the future of {future.policy}",
+        f"{future.reward} · ends at {future.ending}",
+    )
+    figure.text(
+        0.5, 0.08 / height, "\n".join(lines), fontsize=7, color=_MUTED, ha="center", va="bottom"
+    )

@@ -1,0 +1,65 @@
+"""The trust report as plain data, for JSON."""
+
+import math
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from trdlab.explain.trust import trust_findings
+from trdlab.explain.trust_report import TrustReport
+from trdlab.show.verdicts import trust_sentence
+
+SCHEMA = "trdlab.trust/1"
+
+
+def trust_to_dict(report: TrustReport) -> dict[str, Any]:
+    """Returns a trust report as plain data at full precision.
+
+    The schema is `trdlab.trust/1`: lists run over components (`N+1`, or `N` explicit ones), an
+    estimate is `value` with `low` and `high`. What does not exist, and an end of an interval that
+    is infinite, is `null`.
+    """
+    trust = report.trust
+    return {
+        "schema": SCHEMA,
+        "episodes": report.num_episodes,
+        "steps": report.num_steps,
+        "epsilon": report.epsilon,
+        "endings": _plain(report.endings),
+        "trusted": {
+            "last_step": trust.last_step,
+            "components": trust.components,
+            "at_most": trust.at_most,
+            "tested": trust.tested,
+            "residual": trust.residual,
+            "whole": trust.is_whole,
+            "doubtful": trust.doubtful.tolist(),
+        },
+        "calibration": _plain(report.calibration),
+        "hidden": _plain(report.hidden),
+        "blame": _plain(report.blame),
+        "audit": _plain(report.audit),
+        "ceiling": _plain(report.ceiling),
+        "faults": [{"kind": type(fault).__name__, **_plain(fault)} for fault in report.faults],
+        "findings": [
+            _plain(finding.to_dict()) | {"sentence": trust_sentence(finding, report)}
+            for finding in trust_findings(report)
+        ],
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Returns a result as what JSON knows; the time axis, which all parts share, is left out."""
+    if is_dataclass(value):
+        named = (field.name for field in fields(value) if field.name != "time_axis")
+        return {name: _plain(getattr(value, name)) for name in named}
+    if isinstance(value, dict):
+        return {name: _plain(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

@@ -22,8 +22,12 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.livereload import LiveReloadServer
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 _MARKER = re.compile(r"^# %%(?P<prose>.*\[markdown\])?.*$")
+_FROM_THE_NETWORK = re.compile(
+    r'<(?:script|img|iframe)[^>]* src="https?:[^"]*|<link[^>]* href="https?:[^"]*'
+)
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,13 @@ def on_startup(**_: Any) -> None:
     """Lets pages run the `trdlab` of this environment, printing plain text of one width."""
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     os.environ |= {"NO_COLOR": "1", "COLUMNS": "80", "MPLBACKEND": "agg"}
+
+
+def on_post_page(output: str, page: Page, **_: Any) -> str:
+    """Refuses a page that would load something from the network."""
+    if found := _FROM_THE_NETWORK.search(output):
+        raise PluginError(f"{page.file.src_uri} loads from the network: {found[0]}")
+    return output
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:

@@ -5,7 +5,9 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 
 import numpy as np
@@ -18,6 +20,8 @@ from trdlab.tabular import MDP, WindowBuilder, exact, learn
 
 TUTORIALS = Path(__file__).parents[1] / "tutorials"
 LESSONS = sorted(TUTORIALS.glob("[0-9]*.py"))
+TRAINING = LESSONS[4:]
+"""Lessons that train a network for minutes: run once, not once for each question."""
 
 # What a reader who understood would write. Found by solving, not taken from the exercises.
 SOLUTIONS = {
@@ -33,6 +37,9 @@ SOLUTIONS = {
     "4.1": "[2, 1, 1, 1]",
     "4.2": "[2, 4]",
     "4.3": "(1 - 0.2 + 0.2 / 4) ** 2",
+    "5.1": "6 * (40 + 1)",
+    "5.2": "10 * 250 * 4",
+    "5.3": "sum((a - b) ** 2 for a, b in zip([4, 0.5, 2.5], [4, 1, 1]))",
 }
 
 
@@ -65,21 +72,29 @@ def exercises_of(lesson: Path) -> list[str]:
     return [name for name in exercise.EXERCISES if name.startswith(f"{number(lesson)}.")]
 
 
+@cache
+def printed_by(lesson: Path) -> str:
+    """Returns what an unchanged lesson prints: each is run once, for all that is asked of it."""
+    with TemporaryDirectory() as folder:
+        printed = run(lesson, Path(folder))
+        assert list(Path(folder).iterdir()) == []
+    return printed
+
+
 def test_lessons_are_found() -> None:
     assert [lesson.stem for lesson in LESSONS] == [
         "01_read_a_reward_vector",
         "02_derive_it",
         "03_learn_it",
         "04_why_the_sum_fails",
+        "05_from_pixels",
     ]
 
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.stem)
-def test_lesson_runs_unanswered(lesson: Path, tmp_path: Path) -> None:
-    printed = run(lesson, tmp_path)
-    unanswered = re.findall(r"Exercise (\S+): not answered yet", printed)
+def test_lesson_runs_unanswered(lesson: Path) -> None:
+    unanswered = re.findall(r"Exercise (\S+): not answered yet", printed_by(lesson))
     assert unanswered == exercises_of(lesson)
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.stem)
@@ -89,19 +104,22 @@ def test_lesson_accepts_the_solutions(lesson: Path, tmp_path: Path) -> None:
         answered = f"answer_{name[-1]} = {SOLUTIONS[name]}  # filled in"
         source, count = re.subn(rf"answer_{name[-1]} = None +# replace .*", answered, source)
         assert count == 1
+    if lesson in TRAINING:
+        source = "from exercise import check\n" + source[source.index("# ## Your turn") :]
     shutil.copy(TUTORIALS / "exercise.py", tmp_path)
     (tmp_path / lesson.name).write_text(source, encoding="utf-8")
     printed = run(tmp_path / lesson.name, tmp_path)
     assert re.findall(r"Exercise (\S+): right\.", printed) == exercises_of(lesson)
 
 
-@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.stem)
+@pytest.mark.parametrize(
+    "lesson", [of for of in LESSONS if of not in TRAINING], ids=lambda lesson: lesson.stem
+)
 def test_lesson_prints_the_same_each_time(lesson: Path, tmp_path: Path) -> None:
-    assert run(lesson, tmp_path) == run(lesson, tmp_path)
+    assert run(lesson, tmp_path) == printed_by(lesson)
 
 
-def test_first_lesson_shows_the_numbers_of_the_paper(tmp_path: Path) -> None:
-    printed = run(LESSONS[0], tmp_path)
+def test_first_lesson_shows_the_numbers_of_the_paper() -> None:
     for line in (
         "Q(up)   = 3.26",
         "Q(down) = 3.52",
@@ -110,25 +128,24 @@ def test_first_lesson_shows_the_numbers_of_the_paper(tmp_path: Path) -> None:
         "up    [0.   0.   3.26]",
         "down  [0.95 1.76 0.81]",
     ):
-        assert f"\n{line}\n" in printed
+        assert f"\n{line}\n" in printed_by(LESSONS[0])
 
 
-def test_second_lesson_finds_no_deviation(tmp_path: Path) -> None:
-    assert "False" not in run(LESSONS[1], tmp_path)
+def test_second_lesson_finds_no_deviation() -> None:
+    assert "False" not in printed_by(LESSONS[1])
 
 
-def test_third_lesson_learns_what_is_exact(tmp_path: Path) -> None:
-    printed = run(LESSONS[2], tmp_path)
+def test_third_lesson_learns_what_is_exact() -> None:
     for line in (
         "after flight 5: [0.   0.95 0.9  0.86 0.81]",
         "up   [0.    0.    0.    0.    3.258]",
         "largest error anywhere: 0.0",
     ):
-        assert f"\n{line}\n" in f"\n{printed}"
+        assert f"\n{line}\n" in f"\n{printed_by(LESSONS[2])}"
 
 
-def test_fourth_lesson_says_what_its_numbers_show(tmp_path: Path) -> None:
-    printed = run(LESSONS[3], tmp_path)
+def test_fourth_lesson_says_what_its_numbers_show() -> None:
+    printed = printed_by(LESSONS[3])
     assert printed.count("sum 3.52\n") == 4  # the exact vector and three wrong ones
     for line in (
         "1 step(s) later [0.95  1.76  3.022] sum 5.732",
@@ -137,6 +154,16 @@ def test_fourth_lesson_says_what_its_numbers_show(tmp_path: Path) -> None:
         "left out: 7.5% of all windows",
     ):
         assert f"\n{line}\n" in printed
+
+
+def test_fifth_lesson_learns_from_pixels_what_is_exact() -> None:
+    """The lesson itself asserts that no component of any state and action is off by 0.05."""
+    rows = re.findall(r"^ *\d+ +(\d+)((?: +[\d.]+){5})$", printed_by(LESSONS[4]), re.MULTILINE)
+    errors = np.array([row.split() for _, row in rows], dtype=float)
+    optimal = [flight == "4" for flight, _ in rows]
+    assert optimal[-1]
+    assert errors[-1].max() < 0.05
+    assert any(best and row.max() > 1.0 for best, row in zip(optimal, errors, strict=True))
 
 
 @pytest.mark.parametrize("name", exercise.EXERCISES)

@@ -140,6 +140,7 @@ class TrainSettings:
     evaluate_epsilon: float = _option(0.0, "Chance of a random action in it.", "Evaluation")
     checkpoint_every: int = _option(20_000, "Agent steps between two checkpoints.", "Running")
     log_every: int = _option(1_000, "Agent steps between two lines of metrics.", "Running")
+    tensorboard: bool = _option(False, "Write metrics for TensorBoard, too.", "Running")
     device: str = _option("auto", "cpu, cuda, mps, or auto: what is there.", "Running")
     threads: int = _option(0, "Of PyTorch on the CPU; 0: what suits the network.", "Running")
 

@@ -8,6 +8,7 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import Any
 
+from trdlab.deep.board import board, check_board
 from trdlab.deep.memory import check_memory
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
@@ -133,19 +134,23 @@ def carry_on(
     if trainer.done:  # and saved
         return True
     saved, since = -1, time.perf_counter()
-    while not trainer.done and not should_stop():
-        before = trainer.agent_steps
-        trainer.step()
-        now = time.perf_counter()
-        run.seconds, since = run.seconds + now - since, now
-        if _passes(before, trainer.agent_steps, settings.log_every):
-            metrics = trainer.metrics()
-            run.metrics.append({**asdict(metrics), "seconds": round(run.seconds, 3)})
-            on_metrics(metrics)
-        if _passes(before, trainer.agent_steps, settings.checkpoint_every):
-            run.save()
-            saved, since = trainer.agent_steps, time.perf_counter()
-        on_step(trainer)
+    files = run.folder.path / "tensorboard"
+    with board(files, trainer.agent_steps, wanted=settings.tensorboard) as shown:
+        while not trainer.done and not should_stop():
+            before = trainer.agent_steps
+            trainer.step()
+            now = time.perf_counter()
+            run.seconds, since = run.seconds + now - since, now
+            if _passes(before, trainer.agent_steps, settings.log_every):
+                metrics = trainer.metrics()
+                row = {**asdict(metrics), "seconds": round(run.seconds, 3)}
+                run.metrics.append(row)
+                shown.write(row)
+                on_metrics(metrics)
+            if _passes(before, trainer.agent_steps, settings.checkpoint_every):
+                run.save()
+                saved, since = trainer.agent_steps, time.perf_counter()
+            on_step(trainer)
     if saved != trainer.agent_steps:
         run.save()
     return trainer.done
@@ -153,6 +158,7 @@ def carry_on(
 
 def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
     """Returns a trainer at its beginning, and the bytes that its replay memory will take."""
+    check_board(wanted=settings.tensorboard)
     environments = make_environments(settings)
     stack.callback(environments.close)
     memory = memory_of(settings, environments)

@@ -150,18 +150,31 @@ def runs(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where runs are kept.")] = Path(
         "runs"
     ),
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Draw their scores: .png, .pdf or .svg.")
+    ] = None,
+    overwrite: common.Overwrite = False,
     verbose: common.Verbose = False,
 ) -> None:
     """List the runs in a folder: what they learn, how far they are, and their score."""
     from trdlab.runs import list_runs
     from trdlab.show.training import runs_table
 
+    if plot is not None:
+        from trdlab.show.plots import check_picture
+
+        check_picture(plot, overwrite=overwrite)
     console, ascii_only = common.new_console()
     found = list_runs(folder)
-    if found:
-        console.print(runs_table(found, ascii_only=ascii_only))
-    else:
+    if not found:
         console.print(f"There are no runs in '{folder}'.", soft_wrap=True, markup=False)
+        return
+    console.print(runs_table(found, ascii_only=ascii_only))
+    if plot is not None:
+        from trdlab.show.curves import save_learning_curves
+
+        save_learning_curves([run.path for run in found if run.fault is None], plot)
+        _say(_errors(), f"Picture: {plot}")
 
 
 def _train(

@@ -57,6 +57,12 @@ def test_where_all_episodes_are_the_same_some_actions_are_random():
     assert set(told.calibration.states) == {"too few episodes"}
 
 
+def test_copies_that_were_not_followed_do_not_tell_that_there_is_no_chance():
+    report = assess(gridworld_agent("ledge", TimeAxis(0.95, 0)), episodes=20, copying=Copying())
+    assert report.ceiling is not None
+    assert not report.ceiling.deterministic
+
+
 def test_another_environment_shows_what_a_model_leaves_out(tmp_path):
     own, other = (slippery(tmp_path, slip) for slip in (0.0, 0.3))
     at_home = assess(gridworld_agent(own, AXIS), episodes=100)

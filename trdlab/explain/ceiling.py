@@ -23,8 +23,9 @@ class Ceiling:
         skill: `[N+1]`; NaN where it is not known, or where nothing varies.
         num_moments: how many moments were continued from copies.
         copies: n, how often each was.
-        deterministic: whether no two copies of a moment ever differed: then the ceiling is 1, if
-            the chance of the environment is copied as it should be.
+        deterministic: whether it is known what followed, and no two copies of a moment ever
+            differed: then the ceiling is 1, if the chance of the environment is copied as it
+            should be.
     """
 
     time_axis: TimeAxis
@@ -84,7 +85,8 @@ def ceiling(
         skill=by_episode(sums, skill, rng=rng, level=level, resamples=resamples),
         num_moments=len(branches.actions),
         copies=n,
-        deterministic=not np.ptp(observed, axis=1).any(),  # a variance may have rounding errors
+        # a variance may have rounding errors
+        deterministic=bool(known.any() and not np.ptp(observed, axis=1).any()),
     )
 
 

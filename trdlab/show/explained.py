@@ -15,7 +15,6 @@ from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Finding
 from trdlab.explain.trust import trust_findings
 from trdlab.explain.trust_report import TrustReport
-from trdlab.formatting import plain
 from trdlab.show.report import actions_to_dict
 from trdlab.show.sentences import sentence
 from trdlab.show.text import action_table, fit, story
@@ -253,7 +252,7 @@ def _setting(explained: Explained) -> str:
     words = [axis_title(explained.time_axis)]
     seconds = explained.agent.seconds_per_step
     if seconds is not None:
-        words.append(f"a step is {plain(seconds)} s of play")
+        words.append(f"a step is {seconds:.2g} s of play")
     return " · ".join(words)
 
 

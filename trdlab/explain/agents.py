@@ -154,6 +154,7 @@ def run_agent(
     """
     from trdlab.deep.settings import TrainSettings
     from trdlab.training.loading import load
+    from trdlab.training.setup import use_threads
 
     folder = RunFolder.open(path)
     settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
@@ -161,6 +162,7 @@ def run_agent(
         settings = replace(settings, env=env, env_arg=tuple(env_arguments))
     elif env_arguments:
         raise InputError("The run says what its environment is made with.", "Give --env too.")
+    use_threads(settings)
     estimator = load(path, step)
 
     def make(num_envs: int, seed: int) -> Environments:

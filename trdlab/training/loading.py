@@ -11,7 +11,7 @@ from trdlab.errors import TrdlabError
 from trdlab.evaluation import Evaluation, evaluate
 from trdlab.files import write_json
 from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
-from trdlab.training.setup import described_space, future, make_environments
+from trdlab.training.setup import described_space, future, make_environments, use_threads
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
@@ -87,6 +87,7 @@ def evaluate_run(
     folder = RunFolder.open(path)
     settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
     step = checkpoint_steps(folder)[-1] if step is None and checkpoint_steps(folder) else step
+    use_threads(settings)
     estimator = load(path, step)
     count = episodes or settings.evaluate_episodes or 30
     chance = settings.evaluate_epsilon if epsilon is None else epsilon

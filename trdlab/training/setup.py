@@ -118,13 +118,21 @@ def memory_of(
     )
 
 
-def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer":
-    """Returns the trainer of a run, and lets PyTorch use as many threads as it should."""
+def use_threads(settings: TrainSettings) -> None:
+    """Lets PyTorch use as many threads as a run was made for, in all of this process.
+
+    More of them make a small network slower, and other results than those of the run.
+    """
     import torch
 
+    torch.set_num_threads(settings.threads)
+
+
+def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer":
+    """Returns the trainer of a run, and lets PyTorch use as many threads as it should."""
     from trdlab.deep.trainer import Trainer
 
-    torch.set_num_threads(settings.threads)
+    use_threads(settings)
     return Trainer(settings, environments)
 
 

@@ -71,13 +71,13 @@ settings = TrainSettings(
     horizon=4,
     num_envs=8,
     epsilon_end=1.0,  # act at random throughout
-    agent_steps=12_000,
+    agent_steps=12_800,
     learning_starts=4_800,
     update_every=4,
     batch_size=64,
     learning_rate=1e-3,
     learning_rate_end=0.0,
-    target_sync_updates=300,
+    target_sync_updates=250,
     capacity=20_000,
     threads=1,  # so that you see the numbers that are printed here
 )
@@ -101,7 +101,7 @@ estimator.decompose(seen[:1, None])[0]
 #   what is said about all the others. So each update takes a *batch* of what happened, drawn from a
 #   memory of thousands of steps.
 # - If the targets came from the network that is being changed, they would run away from it. They
-#   come from a copy, the **target network**, which is renewed every 300 updates.
+#   come from a copy, the **target network**, which is renewed every 250 updates.
 # - The loss is the squared error, summed over the components: lesson 4 says why not of the sum.
 #
 # We watch the largest error of each component, over all states and actions, and what a flight
@@ -145,9 +145,9 @@ history = [(0, errors())]
 while not trainer.done:
     trainer.step()
     updates = trainer.learner.num_updates
-    if updates > history[-1][0] and updates % 100 == 0:
+    if updates > history[-1][0] and updates % 50 == 0:
         history.append((updates, errors()))
-        if updates % 300 == 0:
+        if updates % 250 == 0:
             row = " ".join(f"{error:6.2f}" for error in history[-1][1])
             print(f"{updates:7}   {score():6.0f}   {row}")
 
@@ -159,7 +159,7 @@ updates, error = (
 figure, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
 for i, label in enumerate(settings.time_axis.labels):
     ax.plot(updates, error[:, i], label=label)
-for copy in range(300, updates[-1], 300):
+for copy in range(250, updates[-1], 250):
     ax.axvline(copy, color="black", lw=0.4, ls=":")
 ax.set(
     xlabel="updates (dotted: a copy to the target network)", ylabel="largest error"
@@ -202,10 +202,13 @@ assert errors().max() < 0.05
 # What this lesson did step by step, a command does as well, with a folder that keeps everything:
 #
 # ```console
-# $ trdlab train gym trdlab/DroneGridworld-v0 --env-arg observation=pixels --N 4 --gamma 0.9
+# $ trdlab train gym trdlab/DroneGridworld-v0 --N 4 --gamma 0.9   # by the state, in minutes
 # $ trdlab evaluate runs/DroneGridworld-v0-N4-w1-seed1
-# $ python benchmarks/pixels.py     # every map and width of this kind, from the source's folder
 # ```
+#
+# With `--env-arg observation=pixels` it learns from the pictures, and takes an hour: the settings
+# above are made for this lesson. In the source's folder, `python benchmarks/pixels.py` holds other
+# maps and wider groups against their exact tables.
 #
 # [How to train an agent](../train.md) tells more.
 

@@ -31,6 +31,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--observation", default="pixels", choices=("pixels", "index"))
     parser.add_argument("--map", nargs="*", default=["drone", "ledge"])
+    parser.add_argument("--treasure", type=float, help="what treasures pay")
     parser.add_argument("--w", type=int, nargs="*", default=[1, 2])
     parser.add_argument("--steps", type=int, default=200_000, help="agent steps, at random")
     parser.add_argument("--updates", type=int, default=2_500)
@@ -46,7 +47,11 @@ def main() -> None:
 
 def run(options: argparse.Namespace, name: str, width: int) -> None:
     axis = TimeAxis(GAMMA, HORIZON, width)
-    world = Gridworld(load_map(name))
+    grid, arguments = load_map(name), [f"map={name}", f"observation={options.observation}"]
+    if options.treasure is not None:
+        grid = grid.with_value("treasure", options.treasure)
+        arguments.append(f"treasure={options.treasure}")
+    world = Gridworld(grid)
     exact = operator_table(world.mdp, axis, 1.0).decomposition.components  # [S, A, N+1]
     states = np.flatnonzero(reachable(world.mdp) & ~world.mdp.terminal_states)
     seen = pictures(world)[states][:, None] if options.observation == "pixels" else states
@@ -54,12 +59,7 @@ def run(options: argparse.Namespace, name: str, width: int) -> None:
     settings = TrainSettings(
         "gym",
         "trdlab/DroneGridworld-v0",
-        env_arg=(
-            f"map={name}",
-            f"observation={options.observation}",
-            "exploring_starts=true",
-            "max_episode_steps=6",
-        ),
+        env_arg=(*arguments, "exploring_starts=true", "max_episode_steps=6"),
         seed=options.seed,
         gamma=GAMMA,
         horizon=HORIZON,

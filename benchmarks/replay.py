@@ -3,9 +3,10 @@
 The agent acts at random, its frames are 84×84 grey ones of ale-py's own vector environment: frame
 skip 4, up to 30 no-ops, then the button that starts a game; and it presses that button again with
 every tenth action, lest Breakout stands still after a lost ball. A bare update is plain torch: the
-Nature CNN (18 actions), batch 32, forward and backward, forward of the target network, fused Adam.
-It takes turns with the sampling of 32 windows with stacks of four frames, as in training, so that
-the memory is read from behind cold caches; machines drift, ratios hold.
+Nature CNN (18 actions, channels last), batch 32, forward and backward, forward of the target
+network, fused Adam; in float32, and with bfloat16 autocast. It takes turns with the sampling of 32
+windows with stacks of four frames, as in training, so that the memory is read from behind cold
+caches; machines drift, ratios hold.
 
     python benchmarks/replay.py             # 20 000 steps of each game
     python benchmarks/replay.py 2000        # fewer
@@ -15,7 +16,6 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
-from itertools import chain
 
 import numpy as np
 import torch
@@ -79,10 +79,6 @@ def clock(function: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def ratio(above: list[float], below: list[float]) -> float:
-    return statistics.median(a / b for a, b in zip(above, below, strict=True))
-
-
 def network(actions: int = 18) -> nn.Module:
     return nn.Sequential(
         *(nn.Conv2d(STACK, 32, 8, 4), nn.ReLU(), nn.Conv2d(32, 64, 4, 2), nn.ReLU()),
@@ -91,7 +87,7 @@ def network(actions: int = 18) -> nn.Module:
     ).to(memory_format=torch.channels_last)
 
 
-def bare_update() -> Callable[[Batch], None]:
+def bare_update(bf16: bool) -> Callable[[Batch], None]:
     """Returns an update in plain torch, of Q-learning, that knows nothing of trdlab."""
     online, target = network(), network()
     adam = torch.optim.Adam(online.parameters(), lr=1e-4, fused=True)
@@ -101,10 +97,11 @@ def bare_update() -> Callable[[Batch], None]:
         return bytes_.to(torch.float32) / 255
 
     def update(batch: Batch) -> None:
-        with torch.no_grad():
-            following = target(images(batch.next_observations)).max(dim=1).values
+        with torch.autocast("cpu", torch.bfloat16, enabled=bf16):
+            with torch.no_grad():
+                following = target(images(batch.next_observations)).float().max(dim=1).values
+            values = online(images(batch.observations)).float()
         wanted = torch.from_numpy(batch.rewards) + torch.from_numpy(batch.discounts) * following
-        values = online(images(batch.observations))
         taken = values.gather(1, torch.from_numpy(batch.actions)[:, None])[:, 0]
         adam.zero_grad(set_to_none=True)
         (taken - wanted).square().mean().backward()
@@ -113,12 +110,34 @@ def bare_update() -> Callable[[Batch], None]:
     return update
 
 
+def shares(
+    memories: list[ReplayBuffer], updates: list[Callable[[Batch], None]]
+) -> tuple[list[list[float]], list[list[list[float]]]]:
+    """Returns the seconds of sampling by memory, and its shares of each update by memory."""
+    rng = np.random.default_rng(1)
+    seconds: list[list[float]] = [[] for _ in memories]
+    parts: list[list[list[float]]] = [[[] for _ in updates] for _ in memories]
+    for turn in range(ROUNDS + 3):  # the first three do not count
+        for memory, sampling, part in zip(memories, seconds, parts, strict=True):
+            for update, ratios in zip(updates, part, strict=True):
+                start = time.perf_counter()
+                batch = memory.sample(BATCH, rng)
+                middle = time.perf_counter()
+                update(batch)
+                if turn >= 3:
+                    sampling.append(middle - start)
+                    ratios.append((middle - start) / (time.perf_counter() - middle))
+    return seconds, parts
+
+
 def main(steps: int) -> None:
     torch.manual_seed(0)
-    update, rng = bare_update(), np.random.default_rng(1)
-    print(f"{'':14} | bytes per  | µs per frame  | ms: sample (share of a bare update) | ms")
-    widths = " ".join(f"{f'w = {width}':>11}" for width in WIDTHS)
-    print(f"{'game':14} | transition | store    read | {widths} | update", flush=True)
+    updates = [bare_update(bf16=False), bare_update(bf16=True)]
+    print(
+        f"{'':14} | bytes per  | µs per frame  | ms to sample (shares of a bare update: fp32, bf16)"
+    )
+    widths = " | ".join(f"{f'w = {width}':^19}" for width in WIDTHS)
+    print(f"{'game':14} | transition | store    read | {widths}", flush=True)
     sizes = []
     for game in GAMES:
         memories = [
@@ -127,26 +146,14 @@ def main(steps: int) -> None:
         ]
         frames = play(game, steps, memories)
         storing, reading = per_frame(frames)
-        sampling: list[list[float]] = [[] for _ in WIDTHS]
-        updating: list[list[float]] = [[] for _ in WIDTHS]
-        for turn in range(ROUNDS + 3):  # the first three do not count
-            for memory, sampled, updated in zip(memories, sampling, updating, strict=True):
-                start = time.perf_counter()
-                batch = memory.sample(BATCH, rng)
-                middle = time.perf_counter()
-                update(batch)
-                if turn >= 3:
-                    sampled.append(middle - start)
-                    updated.append(time.perf_counter() - middle)
         sizes.append(memories[0].bytes_per_transition)
-        shares = " ".join(
-            f"{1e3 * statistics.median(sampled):5.2f} {ratio(sampled, updated):5.1%}"
-            for sampled, updated in zip(sampling, updating, strict=True)
+        told = " | ".join(
+            f"{1e3 * statistics.median(seconds):5.2f} "
+            + " ".join(f"{statistics.median(ratios):6.1%}" for ratios in part)
+            for seconds, part in zip(*shares(memories, updates), strict=True)
         )
         print(
-            f"{game:14} | {sizes[-1]:10.0f} | {storing:5.1f}   {reading:5.1f} | {shares} | "
-            f"{1e3 * statistics.median(chain(*updating)):6.1f}",
-            flush=True,
+            f"{game:14} | {sizes[-1]:10.0f} | {storing:5.1f}   {reading:5.1f} | {told}", flush=True
         )
     mean, told = statistics.fmean(sizes), memory_needed(1_000_000, (84, 84)) / 1e9
     print(

@@ -366,12 +366,26 @@ def test_compression_is_lossless_whatever_the_frame():
     np.testing.assert_array_equal(read, [frames[3], noise, frames[1], frames[1], noise.T, noise])
 
 
+def test_what_stays_the_same_on_a_screen_is_stored_once():
+    rng = np.random.default_rng(0)
+    store = FrameStore((84, 84), np.uint8, 2, 50, compress=True)
+    screens = rng.integers(256, size=(2, 84, 84), dtype=np.uint8)  # cannot be compressed
+    shown = np.repeat(screens[:, None], 120, axis=1)  # [2, 120, 84, 84]
+    shown[:, np.arange(120), np.arange(120) % 84] = 7  # but for a line
+    for t in range(120):
+        for stream in (0, 1):
+            store.append(stream, shown[stream, t])
+    assert store.nbytes < 2 * (3 * (7056 + 100) + 120 * 250)  # three chunks in each stream
+    streams, numbers = np.array([[1], [0]]), np.arange(120)
+    np.testing.assert_array_equal(store.read(streams, numbers[None] + 0 * streams), shown[::-1])
+
+
 def test_what_it_will_take_is_told_beforehand():
     shape, options = (84, 84), {"extras": {"logits": ((18,), np.float32)}, "num_envs": 4}
     memory = ReplayBuffer(4000, shape, width=3, gamma=0.99, stack=4, **options)
     rng = np.random.default_rng(0)
     frames = rng.integers(256, size=(64, *shape), dtype=np.uint8)
-    frames[:, 24:] = 0  # 2 016 bytes of noise are left
+    frames[:, 19:] = 0  # 1 596 bytes of noise are left
     for t in range(1300):
         now, then = (frames[(np.arange(4) * 7 + t + i) % 64] for i in (0, 1))
         logits = {"logits": np.zeros((4, 18))}
@@ -385,15 +399,15 @@ def test_what_it_will_take_is_told_beforehand():
 def test_vectors_take_what_they_are():
     kind = ((4,), np.float32)
     needed = memory_needed(1_000_000, *kind)
-    assert needed == pytest.approx(1_000_000 * (16 + 4 + 22), rel=0.02)
+    assert needed == pytest.approx(1_000_000 * (16 + 4 + 34), rel=0.02)
 
 
 def test_a_memory_that_does_not_fit_is_refused_with_the_cure():
     needed = memory_needed(1_000_000, (84, 84))
     check_memory(needed, 1_000_000, available=4_000_000_000)
-    message = "takes about 2.08 GB, and 2.00 GB is free. Choose a capacity of at most 860000"
+    message = "takes about 1.67 GB, and 1.50 GB is free. Choose a capacity of at most 800000"
     with pytest.raises(TrdlabError, match=message):
-        check_memory(needed, 1_000_000, available=2_000_000_000)
+        check_memory(needed, 1_000_000, available=1_500_000_000)
     free = available_memory()
     assert free is None or free > 0
 

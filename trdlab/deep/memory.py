@@ -13,9 +13,9 @@ from trdlab.deep.frames import chunk_frames, compresses
 from trdlab.deep.ring import TRANSITION_NBYTES
 from trdlab.errors import TrdlabError
 
-COMPRESSED = 0.29
+COMPRESSED = 0.23
 """The part of an 84×84 Atari frame that compression leaves in an unfavourable game (measured by
-`benchmarks/replay.py`: 0.06 for Breakout, 0.26 for Ms. Pac-Man)."""
+`benchmarks/replay.py`: 0.02 for Breakout, 0.14 for Space Invaders; 0.23 for Yars' Revenge)."""
 
 
 def memory_needed(
@@ -41,14 +41,14 @@ def memory_needed(
         extras: what else is stored with a transition.
 
     >>> round(memory_needed(1_000_000, (84, 84)) / 1e9, 1)
-    2.1
+    1.7
     """
-    raw = prod(shape) * np.dtype(dtype).itemsize
+    raw, length = prod(shape) * np.dtype(dtype).itemsize, -(-capacity // num_envs)
+    chunk = chunk_frames(length, raw)
     if frame_nbytes is None:
         smaller = compresses(shape, dtype) if compress is None else compress
-        frame_nbytes = raw * (COMPRESSED if smaller else 1.0) + 4
-    length = -(-capacity // num_envs)
-    frames = num_envs * (length + chunk_frames(length, raw))  # a chunk is forgotten as a whole
+        frame_nbytes = (raw * COMPRESSED + raw / chunk if smaller else raw) + 4
+    frames = num_envs * (length + chunk)  # a chunk is forgotten as a whole
     others = sum(prod(of) * np.dtype(kind).itemsize for of, kind in (extras or {}).values())
     return int(frames * frame_nbytes) + num_envs * length * (TRANSITION_NBYTES + others)
 

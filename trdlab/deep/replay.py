@@ -82,7 +82,7 @@ class ReplayBuffer:
             raise InputError(f"The stack is {stack}.", "It must be at least 1.")
         if padding not in get_args(Padding):
             raise InputError(f"The padding is '{padding}'.", closest(padding, get_args(Padding)))
-        self._ring = Ring(capacity, num_envs, width, time_limit, extras or {})
+        self._ring = Ring(capacity, num_envs, width, float(gamma), time_limit, extras or {})
         self.capacity, self.num_envs = self._ring.capacity, num_envs
         self.width, self.gamma, self.time_limit = width, float(gamma), time_limit
         self.stack, self.padding = stack, padding
@@ -203,7 +203,7 @@ class ReplayBuffer:
 
     def windows(self, places: IntArray) -> Batch:
         """Returns the windows that begin at these `places [K]` in the memory."""
-        rewards, steps, terminated = self._ring.outcomes(places, self.gamma)
+        rewards, steps, terminated = self._ring.outcomes(places)
         observations, next_observations = self._observations(places, steps)
         return Batch(
             observations=observations,
@@ -248,16 +248,14 @@ class ReplayBuffer:
     def _observations(self, places: IntArray, steps: IntArray) -> tuple[Images, Images]:
         """Returns `[K, k, ...]` twice: the stacks at s_t, and so many steps `[K]` later."""
         stack = self.stack or 1
-        begin, age = (self._ring.fields[name][places].astype(np.int64) for name in ("frame", "age"))
+        begin, age = self._ring.fields["frame"][places], self._ring.fields["age"][places]
         end, end_age = begin + steps, age + steps
         if self.width < stack and (steps == self.width).all():  # each frame they share, read once
             numbers = self._stacked(end, end_age, stack + self.width)
         else:
             pair = self._stacked(begin, age, stack), self._stacked(end, end_age, stack)
             numbers = np.concatenate(pair, axis=1)  # [K, 2·k]
-        envs = np.broadcast_to((places % self.num_envs)[:, None], numbers.shape)
-        frames = self._frames.read(envs.ravel(), numbers.ravel())
-        rows = frames.reshape(*numbers.shape, *self._frames.shape)
+        rows = self._frames.read(places[:, None] % self.num_envs, numbers)
         if self.stack is None:
             return rows[:, 0], rows[:, -1]
         return rows[:, :stack], rows[:, -stack:]

@@ -18,7 +18,9 @@ FIELDS: dict[str, npt.DTypeLike] = {
     "action": np.int32,
     "reward": np.float32,
     "ending": np.uint8,
-    "valid": np.bool_,  # whether a finished window begins here
+    "gain": np.float64,  # the discounted rewards so far of the window that begins here
+    "steps": np.int32,  # how many these are
+    "valid": np.bool_,  # whether that window is finished
 }
 """What is kept of each transition."""
 TRANSITION_NBYTES = sum(np.dtype(kind).itemsize for kind in FIELDS.values())
@@ -27,13 +29,15 @@ TRANSITION_NBYTES = sum(np.dtype(kind).itemsize for kind in FIELDS.values())
 class Ring:
     """A ring of L transitions for each of B environments; the oldest are overwritten.
 
-    The transition with the number n of environment b has the place (n mod L)·B + b. Windows are
-    marked as they are finished, so that drawing one costs the same however many there are.
+    The transition with the number n of environment b has the place (n mod L)·B + b. Each step adds
+    its reward to the windows that it belongs to, and marks those that it finishes: so what became
+    of a window only needs to be looked up, and drawing one costs the same however many there are.
 
     Args:
         capacity: L·B, rounded up to a multiple of B.
         num_envs: B.
         width: w, the steps in a window, at most L.
+        gamma: γ, the discount factor of one step.
         time_limit: the step at which every episode is truncated, if it is known: no window is
             begun in the last w − 1 steps before it.
         extras: shape and type of what else is kept of a transition, by name.
@@ -47,6 +51,7 @@ class Ring:
         capacity: int,
         num_envs: int,
         width: int,
+        gamma: float,
         time_limit: int | None,
         extras: Mapping[str, tuple[tuple[int, ...], npt.DTypeLike]],
     ) -> None:
@@ -61,6 +66,7 @@ class Ring:
         """`[L·B, ...]` each."""
         self.counts = np.zeros(num_envs, dtype=np.int64)
         """`[B]`: the transitions so far."""
+        self._discounts = gamma ** np.arange(width)  # [w]
         self._since_end = np.zeros(num_envs, dtype=np.int64)  # [B], of the running episode
         self._num_valid = np.zeros((), dtype=np.int64)
 
@@ -89,7 +95,7 @@ class Ring:
         ending: int,
         extras: Mapping[str, npt.NDArray[Any]],
     ) -> None:
-        """Keeps a transition, in the place of the oldest, and marks the windows that it finishes.
+        """Keeps a transition in the place of the oldest, and adds it to the windows it belongs to.
 
         Args:
             env: whose transition it is.
@@ -102,14 +108,14 @@ class Ring:
         """
         place = self.counts[env] % self.length * self.num_envs + env
         self._num_valid -= self.fields["valid"][place]
-        values = (frame, age, action, reward, ending, False)
+        values = (frame, age, action, reward, ending, 0.0, 0, False)
         for array, value in zip(self.fields.values(), values, strict=True):
             array[place] = value
         for name, row in extras.items():
             self.extras[name][place] = row
         self.counts[env] += 1
         self._since_end[env] += 1
-        self._finish_windows(env, ending)
+        self._add_to_windows(env, ending)
         if ending != RUNS:
             self._since_end[env] = 0
 
@@ -127,42 +133,38 @@ class Ring:
     def draw(self, size: int, rng: np.random.Generator) -> IntArray:
         """Returns `[size]` places where a finished window begins, uniformly, with replacement."""
         valid = self.fields["valid"]
-        used = min(int(self.counts.max()), self.length) * self.num_envs
-        if self._num_valid * 4 < used:
+        used = min(max(self.counts.tolist()), self.length) * self.num_envs
+        if self.num_windows * 4 < used:
             return rng.choice(np.flatnonzero(valid[:used]), size)
         places = np.zeros(0, dtype=np.int64)
         while len(places) < size:  # once or twice, seldom more often
-            drawn = rng.integers(used, size=2 * size)
+            drawn = (rng.random(2 * size) * used).astype(np.int64)  # rng.integers takes longer
             places = np.concatenate([places, drawn[valid[drawn]]])
         return places[:size]
 
-    def outcomes(self, places: IntArray, gamma: float) -> tuple[FloatArray, IntArray, BoolArray]:
+    def outcomes(self, places: IntArray) -> tuple[FloatArray, IntArray, BoolArray]:
         """Returns what became of the windows that begin at `places [K]`.
 
         Returns:
             `[K]` each: the discounted reward Σ_(i<w) γ^i R_(t+i), the steps really taken (w, or
             fewer where the episode terminated sooner), and whether it terminated.
         """
-        steps = np.arange(self.width)
-        window = (places[:, None] + steps * self.num_envs) % self.capacity  # [K, w]
-        endings = self.fields["ending"][window]  # [K, w]
-        ended = endings != RUNS
-        taken = np.where(ended.any(axis=1), ended.argmax(axis=1) + 1, self.width)  # [K]
-        terminated = endings[np.arange(len(places)), taken - 1] == TERMINATED
-        paid = np.where(steps < taken[:, None], self.fields["reward"][window], 0.0)
-        return (paid * gamma**steps).sum(axis=1), taken, terminated
+        steps = self.fields["steps"][places]
+        last = places + (steps - 1) * self.num_envs
+        terminated = self.fields["ending"].take(last, mode="wrap") == TERMINATED
+        return self.fields["gain"][places], steps, terminated
 
-    def _finish_windows(self, env: int, ending: int) -> None:
-        since_end = int(self._since_end[env])
-        if ending == TERMINATED:
-            back = np.arange(min(self.width, since_end))
-        else:
-            back = np.arange(self.width - 1, min(self.width, since_end))  # one, or none
-        places = self._places(env, back)
+    def _add_to_windows(self, env: int, ending: int) -> None:
+        """Adds the newest step to the windows that it belongs to, and marks the finished ones."""
+        size = min(self.width, int(self._since_end[env]))
+        places = self._places(env, np.arange(size))
+        self.fields["gain"][places] += self._discounts[:size] * self.fields["reward"][places[0]]
+        self.fields["steps"][places] += 1
+        finished = places if ending == TERMINATED else places[self.width - 1 :]
         if self.time_limit is not None:
-            places = places[self.fields["age"][places] + self.width <= self.time_limit]
-        self.fields["valid"][places] = True
-        self._num_valid += len(places)
+            finished = finished[self.fields["age"][finished] + self.width <= self.time_limit]
+        self.fields["valid"][finished] = True
+        self._num_valid += len(finished)
 
     def _places(self, env: int, back: IntArray) -> IntArray:
         """Returns the places of the transitions so many steps `back` from the newest."""

@@ -81,6 +81,15 @@ def test_what_comes_after_an_episode_does_not_count():
     assert (beside.returns[1], beside.lengths[1]) == (alone.returns[0], alone.lengths[0]) == (7, 3)
 
 
+def test_an_episode_that_ended_is_not_cut_off_by_the_next():
+    environments = Scripted([1, 1], [1] * 5)
+    result = evaluate(
+        Taking(), environments, on_episode=lambda finished: setattr(environments, "cut", 1)
+    )
+    assert result.truncated.tolist() == [False, False]
+    assert environments.steps[0] == 0  # which was cut off after each step
+
+
 def test_those_that_have_finished_are_not_asked_about():
     estimator = Taking()
     evaluate(estimator, Scripted([1], [1, 1, 1], [1, 1]))

@@ -60,7 +60,7 @@ class ReplayBuffer:
     ...     memory.add([[state]], [0], [4.0], [False], [state == 9], [[state + 1]])
     >>> batch = memory.sample(2, np.random.default_rng(0))
     >>> batch.observations.tolist(), batch.rewards.tolist(), batch.next_observations.tolist()
-    ([[8], [8]], [6.0, 6.0], [[10], [10]])
+    ([[8], [7]], [6.0, 6.0], [[10], [9]])
     """
 
     def __init__(

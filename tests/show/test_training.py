@@ -42,7 +42,7 @@ def test_a_plan_shows_a_configuration_that_can_be_used_and_what_it_takes():
 
 
 def test_memory_where_nobody_knows_what_is_free():
-    assert memory_line(4_260_000, None) == "Replay memory: up to 4.26 MB."
+    assert memory_line(54_260_000, None) == "Replay memory: up to 54.26 MB."
 
 
 @pytest.mark.parametrize(

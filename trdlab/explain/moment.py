@@ -179,7 +179,10 @@ def moment_of(estimator: Estimator, observation: Any, action_names: Sequence[str
     0.5
     """
     batch = np.asarray(observation)[None]  # [1, ...]
-    return Moment(estimator.decompose(batch)[0], tuple(action_names), estimator.future)
+    told = estimator.decompose(batch)[0].components  # [A, N+1]
+    exactly = told.astype(np.float64)  # findings compare sums, and float32 sums differ in order
+    decomposition = RewardDecomposition(exactly, estimator.time_axis)
+    return Moment(decomposition, tuple(action_names), estimator.future)
 
 
 def same(a: float, b: float) -> bool:

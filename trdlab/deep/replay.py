@@ -249,22 +249,18 @@ class ReplayBuffer:
         """Returns `[K, k, ...]` twice: the stacks at s_t, and so many steps `[K]` later."""
         stack = self.stack or 1
         begin, age = self._ring.fields["frame"][places], self._ring.fields["age"][places]
-        end, end_age = begin + steps, age + steps
+        begin, end, first = begin[:, None], (begin + steps)[:, None], (begin - age)[:, None]
         if self.width < stack and (steps == self.width).all():  # each frame they share, read once
-            numbers = self._stacked(end, end_age, stack + self.width)
+            numbers = end - np.arange(stack + self.width - 1, -1, -1)  # [K, k + w]
         else:
-            pair = self._stacked(begin, age, stack), self._stacked(end, end_age, stack)
-            numbers = np.concatenate(pair, axis=1)  # [K, 2·k]
+            back = np.arange(stack - 1, -1, -1)
+            numbers = np.concatenate([begin - back, end - back], axis=1)  # [K, 2·k]
+        before = first if self.padding == "reset" else BLANK
+        numbers = np.where(numbers < first, before, numbers)
         rows = self._frames.read(places[:, None] % self.num_envs, numbers)
         if self.stack is None:
             return rows[:, 0], rows[:, -1]
         return rows[:, :stack], rows[:, -stack:]
-
-    def _stacked(self, frame: IntArray, age: IntArray, size: int) -> IntArray:
-        """Returns `[K, size]`: the numbers of the last `size` frames, up to `frame [K]`."""
-        first = (frame - age)[:, None]
-        numbers = frame[:, None] - np.arange(size - 1, -1, -1)
-        return np.where(numbers < first, first if self.padding == "reset" else BLANK, numbers)
 
     def _arrays(self) -> dict[str, npt.NDArray[Any]]:
         return {**self._ring.arrays(), "ages": self._ages}

@@ -43,6 +43,8 @@ class _Block:
         self.span, self.matrix, self.rewards = span, matrix, rewards
         size = span.stop - span.start
         self._first_rows = np.arange(0, len(rewards), len(rewards) // size)  # [b], of each state
+        lengths = np.diff(matrix.indptr)
+        self._length = int(lengths[0]) if (lengths == lengths[0]).all() else None  # of every row
         self._rows = np.full(size, -1)  # [b], of the chosen actions: none yet
         self._chain, self._gains = matrix, rewards  # [b, S] and [b]: those rows, their rewards
 
@@ -58,8 +60,7 @@ class _Block:
         rows += self._first_rows
         other = not np.array_equal(rows, self._rows)
         if other:
-            self._rows, self._gains = rows, self.rewards[rows]
-            self._chain = take_rows(self.matrix, rows)
+            self._choose(rows)
         return self._replace(values, q_values[rows]), other
 
     def evaluate(self, values: FloatArray, sweeps: int) -> float:
@@ -68,6 +69,17 @@ class _Block:
         for _ in range(sweeps - 1):
             np.add(self._chain @ values, self._gains, out=own)
         return self._replace(values, self._chain @ values + self._gains)
+
+    def _choose(self, rows: IntArray) -> None:
+        begins = self._rows[0] < 0
+        self._rows, self._gains = rows, self.rewards[rows]
+        if begins or self._length is None:
+            self._chain = take_rows(self.matrix, rows)
+            return
+        for name in ("data", "indices"):  # rows of one length take the places of those before
+            new = getattr(self.matrix, name).reshape(-1, self._length)
+            old = getattr(self._chain, name).reshape(-1, self._length)
+            new.take(rows, axis=0, out=old, mode="clip")  # with mode='raise' numpy copies twice
 
     def _replace(self, values: FloatArray, new: FloatArray) -> float:
         own = values[self.span]

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from trdlab.lazy import lazily
+
 if TYPE_CHECKING:
     from trdlab.atari.environments import AtariEnvironments
     from trdlab.atari.game import AtariGame
@@ -10,17 +12,10 @@ if TYPE_CHECKING:
 __all__ = ["AtariEnvironments", "AtariGame", "find_game", "game_names"]
 
 _HOMES = {
-    "AtariEnvironments": "trdlab.atari.environments",
-    "AtariGame": "trdlab.atari.game",
-    "find_game": "trdlab.atari.names",
-    "game_names": "trdlab.atari.names",
+    "AtariEnvironments": "environments",
+    "AtariGame": "game",
+    "find_game": "names",
+    "game_names": "names",
 }
 
-
-def __getattr__(name: str) -> object:
-    """Imports what needs ale-py when it is first asked for."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'trdlab.atari' has no attribute '{name}'")
-    from importlib import import_module
-
-    return getattr(import_module(_HOMES[name]), name)
+__getattr__ = lazily(__name__, _HOMES)

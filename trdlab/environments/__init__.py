@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from trdlab.environments.protocol import Environments, NotReproducible, Padding, Step
+from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
     from trdlab.environments.gym import GymEnvironments
@@ -18,15 +19,8 @@ __all__ = [
 ]
 
 _HOMES = {
-    "GymEnvironments": "trdlab.environments.gym",
-    "make_environment": "trdlab.environments.making",
+    "GymEnvironments": "gym",
+    "make_environment": "making",
 }
 
-
-def __getattr__(name: str) -> object:
-    """Imports what needs Gymnasium when it is first asked for."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'trdlab.environments' has no attribute '{name}'")
-    from importlib import import_module
-
-    return getattr(import_module(_HOMES[name]), name)
+__getattr__ = lazily(__name__, _HOMES)

@@ -10,6 +10,7 @@ from trdlab.explain.finding import Finding
 from trdlab.explain.flips import find_flips
 from trdlab.explain.moment import Moment, Uncertainty, WhatIf, moment_of
 from trdlab.explain.tabular import gridworld_moment, tabular_moment
+from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
     from trdlab.explain.agents import Agent, find_agent, gridworld_agent, run_agent
@@ -84,11 +85,4 @@ _HOMES = {
     "Trust": "trusted",
 }
 
-
-def __getattr__(name: str) -> object:
-    """Imports what needs Gymnasium when it is first asked for."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'trdlab.explain' has no attribute '{name}'")
-    from importlib import import_module
-
-    return getattr(import_module(f"trdlab.explain.{_HOMES[name]}"), name)
+__getattr__ = lazily(__name__, _HOMES)

@@ -6,6 +6,7 @@ import matplotlib. What is said of agents that play is imported when it is first
 
 from typing import TYPE_CHECKING
 
+from trdlab.lazy import lazily
 from trdlab.show.sentences import UnsupportedSentenceError, check, sentence, sentences
 
 if TYPE_CHECKING:
@@ -35,11 +36,4 @@ _HOMES = {
     "trust_sentences": "verdicts",
 }
 
-
-def __getattr__(name: str) -> object:
-    """Imports what needs Gymnasium when it is first asked for."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'trdlab.show' has no attribute '{name}'")
-    from importlib import import_module
-
-    return getattr(import_module(f"trdlab.show.{_HOMES[name]}"), name)
+__getattr__ = lazily(__name__, _HOMES)

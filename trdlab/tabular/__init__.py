@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from trdlab.lazy import lazily
 from trdlab.tabular.mdp import MDP
 from trdlab.tabular.solve import Solution, Ties, evaluate, improved, optimal
 from trdlab.tabular.table import ExactTable, exact
@@ -46,28 +47,21 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Coordinate": "trdlab.tabular.named",
-    "TabularWorld": "trdlab.tabular.named",
-    "from_arrays": "trdlab.tabular.models",
-    "from_environment": "trdlab.tabular.environments",
-    "make_world": "trdlab.tabular.toytext",
-    "tabular_world": "trdlab.tabular.toytext",
-    "LearnedTable": "trdlab.tabular.learned",
-    "learn": "trdlab.tabular.learning",
-    "OperatorTable": "trdlab.tabular.operator",
-    "operator_table": "trdlab.tabular.operator",
-    "Spread": "trdlab.tabular.uncertainty",
-    "outcomes": "trdlab.tabular.uncertainty",
-    "spread": "trdlab.tabular.uncertainty",
-    "WindowBuilder": "trdlab.tabular.windows",
-    "Windows": "trdlab.tabular.windows",
+    "Coordinate": "named",
+    "TabularWorld": "named",
+    "from_arrays": "models",
+    "from_environment": "environments",
+    "make_world": "toytext",
+    "tabular_world": "toytext",
+    "LearnedTable": "learned",
+    "learn": "learning",
+    "OperatorTable": "operator",
+    "operator_table": "operator",
+    "Spread": "uncertainty",
+    "outcomes": "uncertainty",
+    "spread": "uncertainty",
+    "WindowBuilder": "windows",
+    "Windows": "windows",
 }
 
-
-def __getattr__(name: str) -> object:
-    """Imports what the exact solver does not need when it is first asked for: it starts faster."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'trdlab.tabular' has no attribute '{name}'")
-    from importlib import import_module
-
-    return getattr(import_module(_HOMES[name]), name)
+__getattr__ = lazily(__name__, _HOMES)

@@ -13,7 +13,7 @@ from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Finding
 from trdlab.explain.moment import Moment, WhatIf
 from trdlab.explain.tabular import gridworld_moment
-from trdlab.explain.trusted import Trust
+from trdlab.explain.trust.trusted import Trust
 from trdlab.gridworld import Gridworld, load_map, map_names
 from trdlab.show.sentences import TEMPLATES, UnsupportedSentenceError, check, sentences
 from trdlab.tabular import exact

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from trdlab.explain.agents import Agent, find_agent, gridworld_agent, run_agent
     from trdlab.explain.assessment import Copying, assess
     from trdlab.explain.branches import Branches, Branching
-    from trdlab.explain.calibration import Calibration, calibrate
-    from trdlab.explain.ceiling import Ceiling
     from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
     from trdlab.explain.counterfactual import Counterfactual, play_to
     from trdlab.explain.episodes import Counting, Episode, collect
-    from trdlab.explain.trust import trust_findings
-    from trdlab.explain.trust_report import TrustReport, judge
-    from trdlab.explain.trusted import Trust
+    from trdlab.explain.trust.calibration import Calibration, calibrate
+    from trdlab.explain.trust.ceiling import Ceiling
+    from trdlab.explain.trust.findings import trust_findings
+    from trdlab.explain.trust.report import TrustReport, judge
+    from trdlab.explain.trust.trusted import Trust
 
 __all__ = [
     "Agent",
@@ -69,9 +69,9 @@ _HOMES = {
     "assess": "assessment",
     "Branches": "branches",
     "Branching": "branches",
-    "Calibration": "calibration",
-    "calibrate": "calibration",
-    "Ceiling": "ceiling",
+    "Calibration": "trust.calibration",
+    "calibrate": "trust.calibration",
+    "Ceiling": "trust.ceiling",
     "CopyableGymEnvironments": "copies",
     "ModelEnvironments": "copies",
     "Counterfactual": "counterfactual",
@@ -79,10 +79,10 @@ _HOMES = {
     "Counting": "episodes",
     "Episode": "episodes",
     "collect": "episodes",
-    "trust_findings": "trust",
-    "TrustReport": "trust_report",
-    "judge": "trust_report",
-    "Trust": "trusted",
+    "trust_findings": "trust.findings",
+    "TrustReport": "trust.report",
+    "judge": "trust.report",
+    "Trust": "trust.trusted",
 }
 
 __getattr__ = lazily(__name__, _HOMES)

@@ -12,8 +12,8 @@ from trdlab.explain.agents import Agent
 from trdlab.explain.branches import Branches, Branching
 from trdlab.explain.copies import CopyableEnvironments, NotCopyable
 from trdlab.explain.episodes import Episode, collect
-from trdlab.explain.intervals import FEWEST_EPISODES
-from trdlab.explain.trust_report import TrustReport, judge
+from trdlab.explain.trust.intervals import FEWEST_EPISODES
+from trdlab.explain.trust.report import TrustReport, judge
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.explain.copies import CopyableEnvironments
 from trdlab.explain.episodes import AS_PAID, Counting, Decision, Policy, decide
-from trdlab.explain.followed import Samples
+from trdlab.explain.trust.followed import Samples
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from trdlab.estimator import Estimator
 from trdlab.explain.branches import Branches, Branching
 from trdlab.explain.copies import CopyableEnvironments
 from trdlab.explain.episodes import Policy, decide
-from trdlab.explain.intervals import LEVEL, RESAMPLES, Estimates, draws, percentiles
+from trdlab.explain.trust.intervals import LEVEL, RESAMPLES, Estimates, draws, percentiles
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from trdlab.errors import InputError, closest
 from trdlab.estimator import Estimator, Future
 
 if TYPE_CHECKING:
-    from trdlab.explain.trusted import Trust
+    from trdlab.explain.trust.trusted import Trust
 
 RELATIVE_ZERO = 1e-12
 """Two components closer than this, relative to the larger, are the same number."""

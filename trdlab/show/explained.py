@@ -13,8 +13,8 @@ from trdlab.explain.agents import Agent
 from trdlab.explain.assessment import Copying, assess
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Finding
-from trdlab.explain.trust import trust_findings
-from trdlab.explain.trust_report import TrustReport
+from trdlab.explain.trust.findings import trust_findings
+from trdlab.explain.trust.report import TrustReport
 from trdlab.show.report import actions_to_dict
 from trdlab.show.sentences import sentence
 from trdlab.show.text import action_table, fit, story

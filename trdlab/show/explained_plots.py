@@ -11,7 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from trdlab.errors import OutputError
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.moment import Moment
-from trdlab.explain.trust_report import TrustReport
+from trdlab.explain.trust.report import TrustReport
 from trdlab.files import check_output, write_whole
 from trdlab.show.explained import PARTS, Explained, Part
 from trdlab.show.plots import plot_components, plot_contrast, plot_uncertainty, share_scale

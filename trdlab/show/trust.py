@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from trdlab.arrays import FloatArray
-from trdlab.explain.trust_report import TrustReport
+from trdlab.explain.trust.report import TrustReport
 from trdlab.time_axis import axis_title, step_label
 
 _SKILL = "#1f4e8c"  # dark, solid, with dots

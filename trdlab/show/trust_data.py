@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from trdlab.explain.trust import trust_findings
-from trdlab.explain.trust_report import TrustReport
+from trdlab.explain.trust.findings import trust_findings
+from trdlab.explain.trust.report import TrustReport
 from trdlab.show.verdicts import trust_sentence
 
 SCHEMA = "trdlab.trust/1"

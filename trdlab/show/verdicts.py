@@ -1,9 +1,9 @@
 """Findings of a trust report as English sentences, and sentences read back into findings."""
 
-from trdlab.explain import shortcomings, verdicts
-from trdlab.explain.trust import trust_findings
-from trdlab.explain.trust_report import TrustReport
-from trdlab.explain.verdicts import TrustFinding
+from trdlab.explain.trust import shortcomings, verdicts
+from trdlab.explain.trust.findings import trust_findings
+from trdlab.explain.trust.report import TrustReport
+from trdlab.explain.trust.verdicts import TrustFinding
 from trdlab.show.sentences import UnsupportedSentenceError
 from trdlab.show.templates import forms_of, read, say, split
 

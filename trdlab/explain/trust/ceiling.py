@@ -8,8 +8,8 @@ from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.explain.branches import Branches
-from trdlab.explain.followed import per_episode
-from trdlab.explain.intervals import LEVEL, RESAMPLES, Estimates, by_episode
+from trdlab.explain.trust.followed import per_episode
+from trdlab.explain.trust.intervals import LEVEL, RESAMPLES, Estimates, by_episode
 from trdlab.tabular import ExactTable
 from trdlab.tabular.uncertainty import spread
 

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from trdlab.explain.blame import is_off
-from trdlab.explain.faults import is_discount_wrong, is_end_ignored
 from trdlab.explain.finding import agrees
-from trdlab.explain.hidden import SHARE
-from trdlab.explain.trust_report import TrustReport
-from trdlab.explain.verdicts import TrustFinding
+from trdlab.explain.trust.blame import is_off
+from trdlab.explain.trust.faults import is_discount_wrong, is_end_ignored
+from trdlab.explain.trust.hidden import SHARE
+from trdlab.explain.trust.report import TrustReport
+from trdlab.explain.trust.verdicts import TrustFinding
 from trdlab.statistics import Estimate
 
 WORTH_SAYING = 0.005

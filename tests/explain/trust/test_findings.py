@@ -13,20 +13,20 @@ from matplotlib.figure import Figure
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.audit import Audit
-from trdlab.explain.blame import Blame
 from trdlab.explain.branches import Branching
-from trdlab.explain.calibration import Calibration, Endings, State
-from trdlab.explain.ceiling import Ceiling
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import collect
-from trdlab.explain.faults import diagnose
-from trdlab.explain.hidden import Hidden
-from trdlab.explain.intervals import Estimates
-from trdlab.explain.trust import trust_findings
-from trdlab.explain.trust_report import TrustReport, judge
-from trdlab.explain.trusted import trust
-from trdlab.explain.verdicts import TrustFinding
+from trdlab.explain.trust.audit import Audit
+from trdlab.explain.trust.blame import Blame
+from trdlab.explain.trust.calibration import Calibration, Endings, State
+from trdlab.explain.trust.ceiling import Ceiling
+from trdlab.explain.trust.faults import diagnose
+from trdlab.explain.trust.findings import trust_findings
+from trdlab.explain.trust.hidden import Hidden
+from trdlab.explain.trust.intervals import Estimates
+from trdlab.explain.trust.report import TrustReport, judge
+from trdlab.explain.trust.trusted import trust
+from trdlab.explain.trust.verdicts import TrustFinding
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.show import UnsupportedSentenceError
 from trdlab.show.trust import plot_trust
@@ -90,8 +90,8 @@ def reports(draw: st.DrawFn) -> TrustReport:
         at, spread = draw(value), draw(st.sampled_from([0.0, 0.02, 0.6]))
         return Estimate(at, at - spread, at + spread)
 
-    def estimates(shown: list[bool]) -> Estimates:
-        found = [estimate() if is_shown else Estimate(*[np.nan] * 3) for is_shown in shown]
+    def estimates(shown: list[bool], value: st.SearchStrategy[float] = middle) -> Estimates:
+        found = [estimate(value) if is_shown else Estimate(*[np.nan] * 3) for is_shown in shown]
         columns = zip(*((e.value, e.low, e.high) for e in found), strict=True)
         return Estimates(*(np.array(column) for column in columns))
 
@@ -143,7 +143,8 @@ def reports(draw: st.DrawFn) -> TrustReport:
         past_reset=estimate(st.sampled_from([0.0, 0.9])),
     )
     share = draw(st.floats(0.0, 1.0))
-    ceiling = Ceiling(axis, estimates(judged), 50, 4, draw(st.booleans()))
+    limits = estimates(judged, st.sampled_from([0.04, 0.3, 0.9]))
+    ceiling = Ceiling(axis, limits, 50, 4, draw(st.booleans()))
     lives = draw(st.sampled_from([0, 0, 3]))
     return TrustReport(
         future=Future("the greedy policy"),

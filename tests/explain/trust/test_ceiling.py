@@ -13,12 +13,12 @@ from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explain.branches import Branching
-from trdlab.explain.calibration import calibrate
-from trdlab.explain.ceiling import ceiling, exact_ceiling
 from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
 from trdlab.explain.counterfactual import counterfactual, play_to
 from trdlab.explain.episodes import collect
-from trdlab.explain.intervals import Estimates
+from trdlab.explain.trust.calibration import calibrate
+from trdlab.explain.trust.ceiling import ceiling, exact_ceiling
+from trdlab.explain.trust.intervals import Estimates
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import ExactTable, exact, from_environment
 

@@ -14,13 +14,13 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Step
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.blame import blame, is_off
-from trdlab.explain.calibration import calibrate, endings
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Counting, Episode, collect
-from trdlab.explain.followed import pool, what_followed
-from trdlab.explain.hidden import exact_tails, hidden, sufficient_horizon
-from trdlab.explain.trusted import trust
+from trdlab.explain.trust.blame import blame, is_off
+from trdlab.explain.trust.calibration import calibrate, endings
+from trdlab.explain.trust.followed import pool, what_followed
+from trdlab.explain.trust.hidden import exact_tails, hidden, sufficient_horizon
+from trdlab.explain.trust.trusted import trust
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import ExactTable, exact
 

@@ -1,9 +1,10 @@
 """Findings of a trust report: each a claim about how far a forecast can be trusted, and why."""
 
-from trdlab.explain.blame import is_off
-from trdlab.explain.faults import IgnoredEnd, WrongDiscount
-from trdlab.explain.hidden import SHARE
-from trdlab.explain.shortcomings import (
+from trdlab.explain.trust.blame import is_off
+from trdlab.explain.trust.faults import IgnoredEnd, WrongDiscount
+from trdlab.explain.trust.hidden import SHARE
+from trdlab.explain.trust.report import TrustReport
+from trdlab.explain.trust.shortcomings import (
     AmountOff,
     DiscountOff,
     GoesOnAfterEnd,
@@ -22,8 +23,7 @@ from trdlab.explain.shortcomings import (
     TooLate,
     WouldSuffice,
 )
-from trdlab.explain.trust_report import TrustReport
-from trdlab.explain.verdicts import (
+from trdlab.explain.trust.verdicts import (
     AsGoodAsCanBe,
     CannotBeKnown,
     CouldReach,

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.audit import Audit, audit
-from trdlab.explain.blame import MIN_DISCOUNT, Blame, blame
 from trdlab.explain.branches import Branches
-from trdlab.explain.calibration import Calibration, Endings, calibrate, endings
-from trdlab.explain.ceiling import Ceiling, ceiling
 from trdlab.explain.episodes import Episode
-from trdlab.explain.faults import Fault, diagnose
-from trdlab.explain.followed import pool
-from trdlab.explain.hidden import Hidden, hidden
-from trdlab.explain.trusted import Trust, trust
+from trdlab.explain.trust.audit import Audit, audit
+from trdlab.explain.trust.blame import MIN_DISCOUNT, Blame, blame
+from trdlab.explain.trust.calibration import Calibration, Endings, calibrate, endings
+from trdlab.explain.trust.ceiling import Ceiling, ceiling
+from trdlab.explain.trust.faults import Fault, diagnose
+from trdlab.explain.trust.followed import pool
+from trdlab.explain.trust.hidden import Hidden, hidden
+from trdlab.explain.trust.trusted import Trust, trust
 
 
 @dataclass(frozen=True, eq=False)

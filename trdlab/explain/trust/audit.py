@@ -9,8 +9,8 @@ from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.explain.episodes import Episode
-from trdlab.explain.followed import common_axis, next_flag
-from trdlab.explain.intervals import (
+from trdlab.explain.trust.followed import common_axis, next_flag
+from trdlab.explain.trust.intervals import (
     LEVEL,
     RESAMPLES,
     Estimates,

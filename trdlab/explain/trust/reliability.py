@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trdlab.arrays import FloatArray, IntArray
-from trdlab.explain.followed import Samples
+from trdlab.explain.trust.followed import Samples
 
 NUM_BINS = 10
 

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from trdlab.explain.audit import Audit
-from trdlab.explain.blame import Blame
+from trdlab.explain.trust.audit import Audit
+from trdlab.explain.trust.blame import Blame
 from trdlab.statistics import Estimate
 
 EXPLAINED = 0.95

@@ -9,8 +9,8 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.explain.episodes import Episode
-from trdlab.explain.followed import Samples, pool
-from trdlab.explain.intervals import (
+from trdlab.explain.trust.followed import Samples, pool
+from trdlab.explain.trust.intervals import (
     FEWEST_EPISODES,
     LEVEL,
     RESAMPLES,
@@ -18,7 +18,7 @@ from trdlab.explain.intervals import (
     by_episode,
     different_episodes,
 )
-from trdlab.explain.reliability import Reliability, reliability
+from trdlab.explain.trust.reliability import Reliability, reliability
 
 State = Literal["judged", "nothing to predict", "too few episodes", "unknown"]
 

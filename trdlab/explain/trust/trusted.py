@@ -6,7 +6,7 @@ import numpy as np
 
 from trdlab.arrays import BoolArray
 from trdlab.decomposition import TimeAxis
-from trdlab.explain.calibration import Calibration
+from trdlab.explain.trust.calibration import Calibration
 
 SLACK = 0.1
 """How wrong a forecast may be where the reward was always the same, as a share of it."""

@@ -9,8 +9,8 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explain.followed import Samples
-from trdlab.explain.intervals import LEVEL, RESAMPLES, by_episode, draws, has_enough, pooled
+from trdlab.explain.trust.followed import Samples
+from trdlab.explain.trust.intervals import LEVEL, RESAMPLES, by_episode, draws, has_enough, pooled
 from trdlab.statistics import Estimate
 
 LARGEST_SHIFT = 10

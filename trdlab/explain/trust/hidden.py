@@ -8,8 +8,8 @@ import numpy as np
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.explain.episodes import Episode
-from trdlab.explain.followed import common_axis
-from trdlab.explain.intervals import LEVEL, RESAMPLES, by_episode
+from trdlab.explain.trust.followed import common_axis
+from trdlab.explain.trust.intervals import LEVEL, RESAMPLES, by_episode
 from trdlab.statistics import Estimate
 from trdlab.tabular import ExactTable, exact
 

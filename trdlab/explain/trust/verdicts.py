@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from trdlab.explain.finding import agrees
-from trdlab.explain.trust_report import TrustReport
-from trdlab.explain.trusted import is_wrong, trusted
+from trdlab.explain.trust.report import TrustReport
+from trdlab.explain.trust.trusted import is_wrong, trusted
 from trdlab.statistics import Estimate
 
 LITTLE = 0.1

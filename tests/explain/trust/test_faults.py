@@ -12,11 +12,11 @@ from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.audit import Audit, audit
-from trdlab.explain.blame import blame
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Episode, collect
-from trdlab.explain.faults import (
+from trdlab.explain.trust.audit import Audit, audit
+from trdlab.explain.trust.blame import blame
+from trdlab.explain.trust.faults import (
     Fault,
     IgnoredEnd,
     ShiftedReward,
@@ -24,7 +24,7 @@ from trdlab.explain.faults import (
     diagnose,
     discount_exponent,
 )
-from trdlab.explain.followed import pool
+from trdlab.explain.trust.followed import pool
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import MDP, exact, learn
 

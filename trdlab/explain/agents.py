@@ -81,7 +81,8 @@ class Agent:
             return gridworld_moment(self.world, self.estimator, int(stack.observations[0]))
         chosen = decide(self.estimator, stack.observations, self.policy).probabilities[0]
         moment = moment_of(self.estimator, stack.observations[0], self.action_names)
-        return replace(moment, policy=np.asarray(chosen, dtype=np.float64))
+        policy = np.asarray(chosen, dtype=np.float64)
+        return replace(moment, policy=policy, seconds_per_step=self.seconds_per_step)
 
 
 def gridworld_agent(map_name: str, time_axis: TimeAxis, *, env: str | None = None) -> Agent:

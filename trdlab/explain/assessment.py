@@ -67,7 +67,13 @@ def assess(
         played = _played(agent, episodes, chance, seed, on_episode)
     length = float(np.mean([len(episode) for episode in played]))
     branches = None if copying is None else _copied(agent, copying, length, chance, seed + 1)
-    return judge(agent.estimator.future, played, branches, seed=seed)
+    return judge(
+        agent.estimator.future,
+        played,
+        branches,
+        seconds_per_step=agent.seconds_per_step,
+        seed=seed,
+    )
 
 
 def _played(

@@ -1,12 +1,12 @@
-"""A finding: one small true statement about a moment, with the numbers that support it.
+"""A finding: one small true statement, with the numbers that support it.
 
-Each one can check itself: `holds(moment)` tests the claim by its definition, not by the search
+Each one can check itself: `holds(evidence)` tests the claim by its definition, not by the search
 that found it. The numbers it compares may be exact, or `Shown`: read back from printed text.
 """
 
 import re
 from collections.abc import Callable
-from dataclasses import FrozenInstanceError, dataclass
+from dataclasses import FrozenInstanceError
 from typing import Any, ClassVar
 
 from trdlab.arrays import FloatArray
@@ -33,18 +33,22 @@ def agrees(claimed: float, true: float) -> bool:
     return same(claimed, true) or abs(claimed - true) <= 1e-9 * max(1.0, abs(true))
 
 
-@dataclass(eq=False, repr=False)
-class Finding:
-    """Base class: a claim and its numbers, which cannot be changed once they are set.
+class Claim:
+    """Base class: one small statement and its numbers, which cannot be changed once they are set.
 
-    That, equality and the repr are written here once: dataclass would generate them anew for each
-    of some thirty claims, which takes longer than all that a claim is used for.
+    A direct subclass begins a family, of claims about one kind of evidence; what is derived from it
+    is a kind of claim, unless its name begins with an underscore. Equality and the repr are written
+    here once: dataclass would generate them anew for each kind, which takes longer than all that a
+    claim is used for.
     """
 
-    kinds: ClassVar[dict[str, type["Finding"]]] = {}
+    kinds: ClassVar[dict[str, type["Claim"]]] = {}
 
     def __init_subclass__(cls) -> None:
-        cls.kinds[cls.kind()] = cls
+        if Claim in cls.__bases__:
+            cls.kinds = {}
+        elif not cls.__name__.startswith("_"):
+            cls.kinds[cls.kind()] = cls
 
     def __setattr__(self, name: str, value: object) -> None:
         if name in self.__dict__:
@@ -66,13 +70,21 @@ class Finding:
         """Returns the name of the claim, as JSON carries it: `first-reward`."""
         return re.sub(r"(?<!^)([A-Z])", r"-\1", cls.__name__).lower()
 
-    def holds(self, moment: Moment) -> bool:
-        """Returns whether the claim is true of a moment, tested by its definition."""
+    def holds(self, evidence: Any) -> bool:
+        """Returns whether the claim is true of its evidence, tested by its definition."""
         raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the kind and the numbers as plain data."""
         return {"kind": self.kind()} | self.__dict__
+
+
+class Finding(Claim):
+    """A claim about a moment."""
+
+    def holds(self, moment: Moment) -> bool:
+        """Returns whether the claim is true of a moment, tested by its definition."""
+        raise NotImplementedError
 
 
 def one_sign(row: FloatArray) -> bool:

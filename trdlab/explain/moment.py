@@ -79,6 +79,7 @@ class Moment:
         what_ifs: the quantities that can be varied, where there is a model to solve again.
         uncertainty: spread and survival, where they are known.
         trust: how far such forecasts can be trusted, if that has been judged.
+        seconds_per_step: how long a step takes as people play, if that is known.
     """
 
     decomposition: RewardDecomposition
@@ -92,6 +93,7 @@ class Moment:
     what_ifs: tuple[WhatIf, ...] = ()
     uncertainty: Uncertainty | None = None
     trust: "Trust | None" = None
+    seconds_per_step: float | None = None
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):

@@ -1,20 +1,33 @@
-"""Sentences that can be read back: one template writes a finding and reads it again."""
+"""Sentences that can be read back: one template writes a finding and reads it again.
+
+Whatever is printed can so be tested: `Language.check` reads a rendered text back into claims and
+numbers, and holds them against what they speak of.
+"""
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cache
-from typing import Any
+from typing import Any, Generic, TypeVar
 
-from trdlab.decomposition import TimeAxis
-from trdlab.explain.finding import Shown
-from trdlab.formatting import number, percent, significant
-from trdlab.time_axis import step_label
+from trdlab.errors import TrdlabError
+from trdlab.explain.finding import Claim, Shown
+from trdlab.formatting import amount, decimals_between, number, percent, plain, significant
+from trdlab.time_axis import TimeAxis, step_label
 
-_SLOT = re.compile(r"\{(\w+):(\w+)\}")
-_NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+S = TypeVar("S")
+"""What sentences speak of."""
+
+_SLOT = re.compile(r"\{(\w+)(?::(\w+))?\}")
+_NUMBER = r"-?(?:\d+(?:\.\d+)?(?:e[+-]?\d+)?|inf)"
 _COUNT = r"\d[\d,]*"
 _STEP = r"t(?:\+\d+)?"
+_LABEL = r"t\S*?"
+_SECONDS = r"(?: \(in \S+ s\))?"
+
+
+class UnsupportedSentenceError(TrdlabError):
+    """A rendered sentence makes a claim that the numbers do not support."""
 
 
 @dataclass(frozen=True)
@@ -22,53 +35,130 @@ class Form:
     """How a value in a sentence is shown, recognised, and read back.
 
     Args:
-        show: from the value to its text.
+        show: from the value, and the decimals at which the numbers of its sentence are told apart,
+            to its text.
         pattern: of the text, as a regular expression.
         read: from the text to the value, None if it is none.
     """
 
-    show: Callable[[Any], str]
+    show: Callable[[Any, int], str]
     pattern: str
     read: Callable[[str], Any]
 
 
-def forms_of(axis: TimeAxis) -> dict[str, Form]:
-    """Returns the forms that a slot `{field:form}` can take, on a time axis."""
+@dataclass(frozen=True)
+class Language(Generic[S]):
+    """Sentences for the findings about one kind of subject.
+
+    Args:
+        templates: a sentence with slots `{field:form}` for each kind of finding; the form of a
+            bare slot is `action`.
+        forms: from a subject to the forms that its slots can take.
+        about: what a subject is called, for errors.
+        evidence: from a subject to what its findings are held against.
+        given: from a subject to the values of fields that no slot names.
+    """
+
+    templates: Mapping[type[Claim], str]
+    forms: Callable[[S], Mapping[str, Form]]
+    about: str = "these numbers"
+    evidence: Callable[[S], Any] = lambda subject: subject
+    given: Callable[[S], Mapping[str, Any]] = field(default=lambda _: {})
+
+    def say(self, finding: Claim, subject: S) -> str:
+        """Returns a finding as a sentence."""
+        template, forms = self.templates[type(finding)], self.forms(subject)
+        told = [name for name, form in _slots(template) if form in ("value", "amount")]
+        values = [float(getattr(finding, name)) for name in told]
+        decimals = decimals_between(values[0], values[-1]) if values else 2
+
+        def shown(slot: re.Match[str]) -> str:
+            return forms[slot[2] or "action"].show(getattr(finding, slot[1]), decimals)
+
+        text = _SLOT.sub(shown, template)
+        return text[0].upper() + text[1:]
+
+    def check(self, text: str, subject: S) -> list[Claim]:
+        """Reads a rendered text back, tests each claim, and returns the claims.
+
+        Args:
+            text: sentences as `say` returns them, separated by white space.
+            subject: what they speak of.
+
+        Raises:
+            UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
+        """
+        return [self._checked(piece, subject) for piece in split(text)]
+
+    def _checked(self, piece: str, subject: S) -> Claim:
+        forms, evidence, was_read = self.forms(subject), self.evidence(subject), False
+        for kind, template in self.templates.items():
+            values = read(template, piece, forms)
+            if values is None:
+                continue
+            needed = {x.name for x in fields(kind)}  # type: ignore[arg-type]
+            given = self.given(subject)
+            was_read = True
+            claim = kind(**{k: v for k, v in given.items() if k in needed} | values)
+            if claim.holds(evidence):
+                return claim
+        raise UnsupportedSentenceError(
+            f"The sentence '{piece}' {'is not true of' if was_read else 'is no statement about'} "
+            f"{self.about}."
+        )
+
+
+def forms_of(
+    axis: TimeAxis, actions: Sequence[str] = (), seconds: float | None = None
+) -> dict[str, Form]:
+    """Returns the forms that a slot `{field:form}` can take.
+
+    Args:
+        axis: what components mean.
+        actions: A names.
+        seconds: how long a step takes as people play, if that is known.
+    """
     labels = axis.labels
+
+    def component(label: str) -> int | None:
+        return labels.index(label) if label in labels else None
+
+    def many(text: str) -> tuple[int, ...] | None:
+        found = [component(label) for label in _apart(text)]
+        return None if None in found else tuple(c for c in found if c is not None)
+
     return {
-        "count": Form("{:,}".format, _COUNT, _read_count),
+        "action": Form(_text, _names(tuple(actions)), lambda text: _name(text, actions)),
+        "names": Form(lambda names, _: _joined(names), r".+", lambda text: tuple(_apart(text))),
+        "text": Form(_text, r".+?", str),
+        "count": Form(lambda count, _: f"{count:,}", _COUNT, _read_count),
         "steps": _counted("step"),
         "episodes": _counted("episode"),
-        "value": Form(number, _NUMBER, lambda text: Shown(text, number)),
-        "precise": Form(_precise, _NUMBER, lambda text: Shown(text, _precise)),
+        "value": Form(number, _NUMBER, _read_value),
+        "amount": Form(amount, _NUMBER, _read_amount),
+        "plain": Form(lambda x, _: plain(x), _NUMBER, lambda text: Shown(text, plain)),
+        "precise": Form(lambda x, _: _precise(x), _NUMBER, lambda text: Shown(text, _precise)),
         "percent": Form(
-            lambda x: f"{percent(x)} %",
+            lambda x, _: f"{percent(x)} %",
             r"-?\d+(?:\.\d+)? %",
             lambda text: Shown(text.removesuffix(" %"), percent),
         ),
-        "step": Form(step_label, _STEP, lambda text: int(text[2:] or 0)),
-        "label": Form(
-            axis.label,
-            r"t\S*?",
-            lambda text: labels.index(text) if text in labels else None,
+        "roots": Form(
+            lambda roots, _: _joined([significant(root) for root in roots]),
+            r".+",
+            lambda text: tuple(Shown(root, significant) for root in _apart(text)),
         ),
+        "step": Form(lambda step, _: step_label(step), _STEP, _read_step),
+        "label": Form(lambda c, _: axis.label(c), _LABEL, component),
+        "labels": Form(lambda cs, _: _joined([axis.label(c) for c in cs]), r"t.*?", many),
         "begin": Form(
-            lambda component: step_label(axis.start(component)),
+            lambda c, _: step_label(axis.start(c)),
             _STEP,
-            lambda text: _component_from(int(text[2:] or 0), axis),
+            lambda text: _component_from(_read_step(text), axis),
         ),
+        "when": _timed(axis.label, axis.start, component, _LABEL, seconds),
+        "until": _timed(step_label, int, _read_step, _STEP, seconds),
     }
-
-
-def say(template: str, finding: object, forms: Mapping[str, Form]) -> str:
-    """Returns a finding as a sentence.
-
-    Args:
-        template: with slots `{field:form}`.
-        finding: whose fields fill them.
-        forms: how each is shown.
-    """
-    return _SLOT.sub(lambda slot: forms[slot[2]].show(getattr(finding, slot[1])), template)
 
 
 def read(template: str, text: str, forms: Mapping[str, Form]) -> dict[str, Any] | None:
@@ -76,25 +166,12 @@ def read(template: str, text: str, forms: Mapping[str, Form]) -> dict[str, Any] 
 
     Numbers are read as `Shown`: they equal every number that is printed the same way.
     """
-    pattern, slots = _pattern(template, tuple((name, form.pattern) for name, form in forms.items()))
-    match = pattern.fullmatch(text)
+    slots = _slots(template)
+    match = _pattern(template, tuple(forms[form].pattern for _, form in slots)).fullmatch(text)
     if match is None:
         return None
-    fields = {field: forms[form].read(match[field]) for field, form in slots}
-    return None if None in fields.values() else fields
-
-
-@cache
-def _pattern(
-    template: str, patterns: tuple[tuple[str, str], ...]
-) -> tuple[re.Pattern[str], tuple[tuple[str, str], ...]]:
-    of, pattern, end, slots = dict(patterns), "", 0, []
-    for slot in _SLOT.finditer(template):
-        between = re.escape(template[end : slot.start()])
-        pattern += f"{between}(?P<{slot[1]}>{of[slot[2]]})"
-        slots.append((slot[1], slot[2]))
-        end = slot.end()
-    return re.compile(pattern + re.escape(template[end:])), tuple(slots)
+    values = {name: forms[form].read(match[name]) for name, form in slots}
+    return None if None in values.values() else values
 
 
 def split(text: str) -> list[str]:
@@ -102,10 +179,50 @@ def split(text: str) -> list[str]:
     return [piece for piece in re.split(r"(?<=\.)\s+", text.strip()) if piece]
 
 
+@cache
+def _slots(template: str) -> tuple[tuple[str, str], ...]:
+    """Returns the field and the form of each slot."""
+    return tuple((slot[1], slot[2] or "action") for slot in _SLOT.finditer(template))
+
+
+@cache
+def _pattern(template: str, patterns: tuple[str, ...]) -> re.Pattern[str]:
+    pattern, end = "", 0
+    for slot, of in zip(_SLOT.finditer(template), patterns, strict=True):
+        pattern += f"{re.escape(template[end : slot.start()])}(?P<{slot[1]}>{of})"
+        end = slot.end()
+    pattern += re.escape(template[end:])
+    return re.compile(pattern)
+
+
+@cache
+def _names(actions: tuple[str, ...]) -> str:
+    """Returns the pattern of a name; only the subject's own actions are names."""
+    names = {name[0].upper() + name[1:] for name in actions} | set(actions)
+    return "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True)) or r"(?!)"
+
+
+def _name(text: str, actions: Sequence[str]) -> str:
+    lowered = text[0].lower() + text[1:]  # it may stand at the start of a sentence
+    return lowered if text not in actions and lowered in actions else text
+
+
+def _text(text: str, _: int) -> str:
+    return str(text)
+
+
+def _joined(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _apart(text: str) -> list[str]:
+    return re.split(r", | and ", text)
+
+
 def _counted(noun: str) -> Form:
     """Returns the form of so many things: `1 step`, `12,000 steps`."""
 
-    def show(count: int) -> str:
+    def show(count: int, _: int = 0) -> str:
         return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
     def read_back(text: str) -> int | None:
@@ -115,6 +232,43 @@ def _counted(noun: str) -> Form:
     return Form(show, rf"{_COUNT} {noun}s?", read_back)
 
 
+def _timed(
+    label: Callable[[int], str],
+    start: Callable[[int], int],
+    read_label: Callable[[str], int | None],
+    pattern: str,
+    seconds: float | None,
+) -> Form:
+    """Returns the form of a future time, with its seconds of play where these are known."""
+
+    def show(value: int, _: int = 0) -> str:
+        steps = start(value)
+        if seconds is None or steps == 0:
+            return label(value)
+        return f"{label(value)} (in {steps * seconds:.2g} s)"
+
+    def read_back(text: str) -> int | None:
+        value = read_label(text.partition(" (")[0])
+        return value if value is not None and show(value) == text else None
+
+    return Form(show, pattern + _SECONDS, read_back)
+
+
+def _read_value(text: str) -> Shown:
+    decimals = _decimals(text)
+    return Shown(text, lambda x: number(x, decimals))
+
+
+def _read_amount(text: str) -> Shown:
+    decimals = _decimals(text)
+    return Shown(text, lambda x: amount(x, decimals))
+
+
+def _decimals(text: str) -> int:
+    """Returns the decimals of a printed number; any above 2, where it took an exponent."""
+    return 3 if "e" in text else len(text.partition(".")[2]) or 2
+
+
 def _precise(value: float) -> str:
     return significant(value, 4)
 
@@ -122,6 +276,10 @@ def _precise(value: float) -> str:
 def _read_count(text: str) -> int | None:
     count = int(text.replace(",", ""))
     return count if f"{count:,}" == text else None
+
+
+def _read_step(text: str) -> int:
+    return int(text[2:] or 0)
 
 
 def _component_from(step: int, axis: TimeAxis) -> int | None:

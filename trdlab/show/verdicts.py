@@ -1,16 +1,16 @@
 """Findings of a trust report as English sentences, and sentences read back into findings."""
 
+from trdlab.explain.finding import Claim
 from trdlab.explain.trust import shortcomings, verdicts
 from trdlab.explain.trust.findings import trust_findings
 from trdlab.explain.trust.report import TrustReport
 from trdlab.explain.trust.verdicts import TrustFinding
-from trdlab.show.sentences import UnsupportedSentenceError
-from trdlab.show.templates import forms_of, read, say, split
+from trdlab.show.templates import Language, forms_of
 
-TEMPLATES: dict[type[TrustFinding], str] = {
-    verdicts.TrustedTo: "The forecast can be trusted to {step:step}.",
+TEMPLATES: dict[type[Claim], str] = {
+    verdicts.TrustedTo: "The forecast can be trusted to {step:until}.",
     verdicts.TrustedThroughout: (
-        "The forecast can be trusted over its whole horizon, to {step:step}."
+        "The forecast can be trusted over its whole horizon, to {step:until}."
     ),
     verdicts.NotTrusted: "The forecast cannot be trusted at any step.",
     verdicts.NothingTested: (
@@ -97,6 +97,13 @@ TEMPLATES: dict[type[TrustFinding], str] = {
 }
 
 
+LANGUAGE = Language[TrustReport](
+    TEMPLATES,
+    lambda report: forms_of(report.time_axis, seconds=report.seconds_per_step),
+    about="this report",
+)
+
+
 def trust_sentences(report: TrustReport) -> list[str]:
     """Returns the findings of a report as sentences, in their order."""
     return [trust_sentence(finding, report) for finding in trust_findings(report)]
@@ -104,10 +111,10 @@ def trust_sentences(report: TrustReport) -> list[str]:
 
 def trust_sentence(finding: TrustFinding, report: TrustReport) -> str:
     """Returns one finding as a sentence."""
-    return say(TEMPLATES[type(finding)], finding, forms_of(report.time_axis))
+    return LANGUAGE.say(finding, report)
 
 
-def check_trust(text: str, report: TrustReport) -> list[TrustFinding]:
+def check_trust(text: str, report: TrustReport) -> list[Claim]:
     """Reads a rendered text back, tests each claim against a report, and returns the claims.
 
     Args:
@@ -117,18 +124,4 @@ def check_trust(text: str, report: TrustReport) -> list[TrustFinding]:
     Raises:
         UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
     """
-    return [_checked(piece, report) for piece in split(text)]
-
-
-def _checked(piece: str, report: TrustReport) -> TrustFinding:
-    forms, was_read = forms_of(report.time_axis), False
-    for kind, template in TEMPLATES.items():
-        fields = read(template, piece, forms)
-        if fields is not None:
-            was_read, finding = True, kind(**fields)
-            if finding.holds(report):
-                return finding
-    raise UnsupportedSentenceError(
-        f"The sentence '{piece}' {'is not true of' if was_read else 'is no statement about'} "
-        "this report."
-    )
+    return LANGUAGE.check(text, report)

@@ -35,6 +35,7 @@ class TrustReport:
         audit: how steps fit each other; None for N = 0.
         ceiling: the skill of a perfect prediction; None where states were not copied.
         faults: what is surely implemented wrongly.
+        seconds_per_step: how long a step takes as people play, if that is known.
     """
 
     future: Future
@@ -49,6 +50,7 @@ class TrustReport:
     audit: Audit | None
     ceiling: Ceiling | None
     faults: tuple[Fault, ...]
+    seconds_per_step: float | None = None
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -61,6 +63,7 @@ def judge(
     episodes: Sequence[Episode],
     branches: Branches | None = None,
     *,
+    seconds_per_step: float | None = None,
     seed: int = 0,
 ) -> TrustReport:
     """Judges an estimator by its episodes.
@@ -69,6 +72,7 @@ def judge(
         future: whose future it speaks of.
         episodes: what it predicted and what happened.
         branches: what else could have followed, for the ceiling.
+        seconds_per_step: how long a step takes as people play, if that is known.
         seed: of every bootstrap.
 
     Raises:
@@ -98,4 +102,5 @@ def judge(
         audit=audited,
         ceiling=None if branches is None else ceiling(branches, seed=seed),
         faults=diagnose(blamed, audited),
+        seconds_per_step=seconds_per_step,
     )

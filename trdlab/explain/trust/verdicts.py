@@ -1,12 +1,10 @@
 """Claims about how far a forecast can be trusted, and why no further."""
 
-import re
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 import numpy as np
 
-from trdlab.explain.finding import agrees
+from trdlab.explain.finding import Claim, agrees
 from trdlab.explain.trust.report import TrustReport
 from trdlab.explain.trust.trusted import is_wrong, trusted
 from trdlab.statistics import Estimate
@@ -15,34 +13,18 @@ LITTLE = 0.1
 """A ceiling below this leaves little to know."""
 
 
-@dataclass(frozen=True)
-class TrustFinding:
-    """Base class: a claim about a trust report, and its numbers."""
-
-    kinds: ClassVar[dict[str, type["TrustFinding"]]] = {}
-
-    def __init_subclass__(cls) -> None:
-        if not cls.__name__.startswith("_"):
-            cls.kinds[cls.kind()] = cls
-
-    @classmethod
-    def kind(cls) -> str:
-        """Returns the name of the claim, as JSON carries it: `trusted-to`."""
-        return re.sub(r"(?<!^)([A-Z])", r"-\1", cls.__name__).lower()
+class TrustFinding(Claim):
+    """A claim about a trust report."""
 
     def holds(self, report: TrustReport) -> bool:
         """Returns whether the claim is true of a report, tested by its definition."""
         raise NotImplementedError
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the kind and the numbers as plain data."""
-        return {"kind": self.kind()} | self.__dict__
-
 
 # ---- how far ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class TrustedTo(TrustFinding):
     """Every component up to a step is trusted, and the next one is not."""
 
@@ -53,7 +35,7 @@ class TrustedTo(TrustFinding):
         return tested > 0 and passed == _ends(self.step, report) < report.time_axis.horizon
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class TrustedThroughout(TrustFinding):
     """Every explicit component is trusted."""
 
@@ -64,7 +46,7 @@ class TrustedThroughout(TrustFinding):
         return tested > 0 and passed == _ends(self.step, report) == report.time_axis.horizon
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class NotTrusted(TrustFinding):
     """No step is to be trusted: none before the first failure was tested and passed."""
 
@@ -73,7 +55,7 @@ class NotTrusted(TrustFinding):
         return tested == 0 and passed < report.time_axis.horizon
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class NothingTested(TrustFinding):
     """The reward was always the same at every step, and forecast so."""
 
@@ -82,7 +64,7 @@ class NothingTested(TrustFinding):
         return tested == 0 and passed == report.time_axis.horizon > 0
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class CouldReach(TrustFinding):
     """The last step up to which the intervals do not rule trust out."""
 
@@ -100,7 +82,7 @@ class CouldReach(TrustFinding):
 # ---- why no further ------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class _FirstFailure(TrustFinding):
     """A reason why the first component that is not trusted is not."""
 
@@ -112,7 +94,7 @@ class _FirstFailure(TrustFinding):
         return 0 <= c < len(sure) and bool(sure[:c].all()) and not sure[c]
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class NoSkillAt(_FirstFailure):
     """It is surely no better than a constant guess."""
 
@@ -121,7 +103,7 @@ class NoSkillAt(_FirstFailure):
         return self._is_first(report) and bool(high[self.component] <= 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class NoSkillFrom(_FirstFailure):
     """So are all the explicit components after it, and there are some."""
 
@@ -130,7 +112,7 @@ class NoSkillFrom(_FirstFailure):
         return self._is_first(report) and c < len(high) - 1 and bool((high[c:] <= 0.0).all())
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class UnsureAt(_FirstFailure):
     """It may or may not be better than a constant guess."""
 
@@ -139,7 +121,7 @@ class UnsureAt(_FirstFailure):
         return self._is_first(report) and bool(skill.low[c] <= 0.0 < skill.high[c])
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class WrongAt(_FirstFailure):
     """The reward was always the same, and the forecast is another."""
 
@@ -148,7 +130,7 @@ class WrongAt(_FirstFailure):
         return self._is_first(report) and bool(constant[self.component])
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class TooFewAt(_FirstFailure):
     """Too few different episodes tell of it."""
 
@@ -160,7 +142,7 @@ class TooFewAt(_FirstFailure):
         return few and bool(self.episodes == calibration.num_episodes[c])
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class NothingToPredict(TrustFinding):
     """How many of the explicit components had the same reward always."""
 
@@ -172,7 +154,7 @@ class NothingToPredict(TrustFinding):
         return bool(0 < self.count == constant.sum() < len(constant) == self.total)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class UnknownAt(_FirstFailure):
     """It is not known of any step what followed."""
 
@@ -184,7 +166,7 @@ class UnknownAt(_FirstFailure):
 # ---- what can be known ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class NoChance(TrustFinding):
     """No two copies of a state ever went differently."""
 
@@ -192,7 +174,7 @@ class NoChance(TrustFinding):
         return report.ceiling is not None and report.ceiling.deterministic
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class CannotBeKnown(TrustFinding):
     """A perfect forecast of a component would surely have little skill."""
 
@@ -204,7 +186,7 @@ class CannotBeKnown(TrustFinding):
         return limit.high < LITTLE and agrees(self.at_most, limit.high)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class IsNotKnown(TrustFinding):
     """A perfect forecast of a component would surely have more skill."""
 
@@ -218,7 +200,7 @@ class IsNotKnown(TrustFinding):
         return same and limit.high >= LITTLE and skill.high < limit.low
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, repr=False)
 class AsGoodAsCanBe(TrustFinding):
     """The skill of a component is not surely less than that of a perfect forecast."""
 

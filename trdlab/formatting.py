@@ -28,7 +28,8 @@ def decimals_between(a: float, b: float) -> int:
     (2, 4)
     """
     decimals = decimals_for((a, b))
-    while a != b and decimals < 9 and f"{a:.{decimals}f}" == f"{b:.{decimals}f}":
+    differ = not math.isclose(a, b, rel_tol=1e-12)
+    while differ and decimals < 9 and f"{a:.{decimals}f}" == f"{b:.{decimals}f}":
         decimals += 1
     return decimals
 

@@ -11,9 +11,14 @@ from trdlab.errors import InputError
 from trdlab.explain.agents import Agent
 from trdlab.explain.branches import Branches, Branching
 from trdlab.explain.copies import CopyableEnvironments, NotCopyable
+from trdlab.explain.counterfactual import counterfactual, play_to
 from trdlab.explain.episodes import Episode, collect
+from trdlab.explain.tried import Trial
 from trdlab.explain.trust.intervals import FEWEST_EPISODES
 from trdlab.explain.trust.report import TrustReport, judge
+
+FOLLOWED = 100
+"""Steps for which two actions that are tried are followed at least."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ def assess(
         agent: whom to judge.
         episodes: how many to play.
         epsilon: the chance of a random action.
-        copying: how states are copied for the ceiling; without it there is none, nor is there one
+        copying: how states are copied for the ceiling and for foils; without it there are none, nor
             where states cannot be copied.
         seed: of everything.
         on_episode: called with the number of finished episodes whenever some finish.
@@ -66,14 +71,59 @@ def assess(
         chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
         played = _played(agent, episodes, chance, seed, on_episode)
     length = float(np.mean([len(episode) for episode in played]))
-    branches = None if copying is None else _copied(agent, copying, length, chance, seed + 1)
+    copied = None if copying is None else _copied(agent, copying, length, chance, seed + 1)
     return judge(
         agent.estimator.future,
         played,
-        branches,
+        *(copied or ()),
         seconds_per_step=agent.seconds_per_step,
         seed=seed,
     )
+
+
+def try_out(
+    agent: Agent, action: str, foil: str, *, seed: int = 0, step: int = 0, copies: int = 50
+) -> Trial | None:
+    """Tries two actions at a step of an agent's episode, each from copies of the state.
+
+    The copies are followed until all have ended, but no further than `FOLLOWED` steps or the
+    explicit components, whichever is more.
+
+    Args:
+        agent: whose policy is followed after the first action.
+        action: the name of one action.
+        foil: the name of the other.
+        seed: of the episode.
+        step: of that episode.
+        copies: how often each is tried.
+
+    Returns:
+        What was forecast and what came; None where states cannot be copied.
+
+    Raises:
+        InputError: there is no such step or action, or both are the same.
+    """
+    environments = agent.make(1, seed)
+    steps = max(FOLLOWED, agent.estimator.time_axis.num_steps)
+    branching = Branching(agent.estimator, agent.policy, agent.counting, copies, steps)
+    try:
+        if not _can_be_copied(environments):
+            return None
+        stack = play_to(agent.estimator, environments, step, policy=agent.policy, seed=seed)
+        found = counterfactual(
+            branching,
+            environments,
+            stack,
+            agent.action_names.index(action),
+            agent.action_names.index(foil),
+            age=step,
+            seed=seed,
+        )
+    except NotCopyable:
+        return None
+    finally:
+        environments.close()
+    return Trial(found, agent.action_names, agent.seconds_per_step)
 
 
 def _played(
@@ -106,19 +156,31 @@ def _different(episodes: Sequence[Episode]) -> int:
 
 def _copied(
     agent: Agent, copying: Copying, length: float, epsilon: float, seed: int
-) -> Branches | None:
-    """Returns what else could have followed; None where states cannot be copied."""
-    environments = agent.make(copying.episodes, seed)
-    try:
-        if not _can_be_copied(environments):
+) -> tuple[Branches, Branches | None] | None:
+    """Returns what else could have followed, and what follows foils, if there is another action.
+
+    None where states cannot be copied.
+    """
+    branching = Branching(agent.estimator, agent.policy, agent.counting, copies=copying.copies)
+    every = max(1, round(length / copying.moments))
+
+    def along(seed: int, *, foils: bool) -> Branches | None:
+        environments = agent.make(copying.episodes, seed)
+        try:
+            if not _can_be_copied(environments):
+                return None
+            return branching.along(
+                environments, every=every, epsilon=epsilon, seed=seed, foils=foils
+            )
+        except NotCopyable:
             return None
-        branching = Branching(agent.estimator, agent.policy, agent.counting, copies=copying.copies)
-        every = max(1, round(length / copying.moments))
-        return branching.along(environments, every=every, epsilon=epsilon, seed=seed)
-    except NotCopyable:
+        finally:
+            environments.close()
+
+    branches = along(seed, foils=False)
+    if branches is None:
         return None
-    finally:
-        environments.close()
+    return branches, along(seed + 1, foils=True) if len(agent.action_names) > 1 else None
 
 
 def _can_be_copied(environments: Environments) -> TypeGuard[CopyableEnvironments]:

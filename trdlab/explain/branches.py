@@ -119,12 +119,13 @@ class Branching:
             decision = decide(self.estimator, stack.observations[running], self.policy)
             actions = np.zeros(count, dtype=np.int64)
             actions[running] = decision.draw(rng)
+            own = actions.copy()
             random = running & (rng.random(count) < epsilon)
             actions[random] = rng.integers(environments.num_actions, size=int(random.sum()))
             due = running & (age % every == phase)
             if due.any():
                 here = decision.decomposition.components[due[running]]  # [M′, A, N+1]
-                first = _others(actions[due], here.shape[1], rng) if foils else actions[due]
+                first = _others(own[due], environments.num_actions, rng) if foils else actions[due]
                 moments = np.flatnonzero(due)
                 found.append(self._continued(environments, stack, moments, first, age, here, rng))
             step = environments.step(actions)

@@ -25,6 +25,8 @@ class Counterfactual:
         action: the number of one action.
         foil: the number of the other.
         copies: how often each was tried.
+        whole: whether all copies came to an end, so that the sum holds the residual too; otherwise
+            it is that of the explicit components.
         predicted: `[N+2]`, action − foil of every component, and of their sum.
         observed: `[N+2]`, the same of the means of what followed; NaN where that is not known.
             There is no interval where nothing varied, unless nothing did at any step: what happened
@@ -35,8 +37,15 @@ class Counterfactual:
     action: int
     foil: int
     copies: int
+    whole: bool
     predicted: FloatArray
     observed: Estimates
+
+    @property
+    def same_every_time(self) -> bool:
+        """Whether all copies of each action went the same way, at every step that is known."""
+        known = ~np.isnan(self.observed.value)
+        return bool((self.observed.low == self.observed.high)[known].all())
 
 
 def counterfactual(
@@ -75,7 +84,8 @@ def counterfactual(
         for first, own in zip((action, foil), seeds, strict=True)
     ]
     rng = np.random.default_rng(seed)
-    futures = [_futures(branches) for branches in tried]  # 2 of [n, N+2]
+    whole = all(bool(branches.known[0, -1]) for branches in tried)
+    futures = [_futures(branches, whole) for branches in tried]  # 2 of [n, N+2]
     one, other = (draws(len(of), resamples, rng) @ of / len(of) for of in futures)
     varies = np.max([np.ptp(of, axis=0) > 0.0 for of in futures], axis=0)  # [N+2]
     found = percentiles(one - other, level, branching.copies > 1)
@@ -85,7 +95,8 @@ def counterfactual(
         action=action,
         foil=foil,
         copies=branching.copies,
-        predicted=np.append(predicted, predicted.sum()),
+        whole=whole,
+        predicted=np.append(predicted, (predicted if whole else predicted[:-1]).sum()),
         observed=found.where(np.True_, varies | ~varies.any()),
     )
 
@@ -123,7 +134,7 @@ def play_to(
     return stack
 
 
-def _futures(branches: Branches) -> FloatArray:
+def _futures(branches: Branches, whole: bool) -> FloatArray:
     """Returns `[n, N+2]`: every component of what followed, and their sum; NaN if not known."""
     observed = np.where(branches.known[0], branches.observed[0], np.nan)  # [n, N+1]
-    return np.column_stack([observed, observed.sum(axis=1)])
+    return np.column_stack([observed, (observed if whole else observed[:, :-1]).sum(axis=1)])

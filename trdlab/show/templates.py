@@ -13,6 +13,7 @@ from typing import Any, Generic, TypeVar
 from trdlab.errors import TrdlabError
 from trdlab.explain.finding import Claim, Shown
 from trdlab.formatting import amount, decimals_between, number, percent, plain, significant
+from trdlab.statistics import Estimate
 from trdlab.time_axis import TimeAxis, step_label
 
 S = TypeVar("S")
@@ -20,10 +21,16 @@ S = TypeVar("S")
 
 _SLOT = re.compile(r"\{(\w+)(?::(\w+))?\}")
 _NUMBER = r"-?(?:\d+(?:\.\d+)?(?:e[+-]?\d+)?|inf)"
+_ESTIMATE = rf"{_NUMBER}(?: on average \({_NUMBER} to {_NUMBER}\))?"
 _COUNT = r"\d[\d,]*"
 _STEP = r"t(?:\+\d+)?"
 _LABEL = r"t\S*?"
 _SECONDS = r"(?: \(in \S+ s\))?"
+_COMPARED: dict[str, Callable[[Any], float]] = {
+    "value": float,
+    "amount": float,
+    "estimate": lambda estimate: float(estimate.value),
+}
 
 
 class UnsupportedSentenceError(TrdlabError):
@@ -68,8 +75,8 @@ class Language(Generic[S]):
     def say(self, finding: Claim, subject: S) -> str:
         """Returns a finding as a sentence."""
         template, forms = self.templates[type(finding)], self.forms(subject)
-        told = [name for name, form in _slots(template) if form in ("value", "amount")]
-        values = [float(getattr(finding, name)) for name in told]
+        told = [(name, form) for name, form in _slots(template) if form in _COMPARED]
+        values = [_COMPARED[form](getattr(finding, name)) for name, form in told]
         decimals = decimals_between(values[0], values[-1]) if values else 2
 
         def shown(slot: re.Match[str]) -> str:
@@ -136,6 +143,7 @@ def forms_of(
         "episodes": _counted("episode"),
         "value": Form(number, _NUMBER, _read_value),
         "amount": Form(amount, _NUMBER, _read_amount),
+        "estimate": Form(_show_estimate, _ESTIMATE, _read_estimate),
         "plain": Form(lambda x, _: plain(x), _NUMBER, lambda text: Shown(text, plain)),
         "precise": Form(lambda x, _: _precise(x), _NUMBER, lambda text: Shown(text, _precise)),
         "percent": Form(
@@ -187,10 +195,12 @@ def _slots(template: str) -> tuple[tuple[str, str], ...]:
 
 @cache
 def _pattern(template: str, patterns: tuple[str, ...]) -> re.Pattern[str]:
-    pattern, end = "", 0
+    pattern, end, seen = "", 0, set()
     for slot, of in zip(_SLOT.finditer(template), patterns, strict=True):
-        pattern += f"{re.escape(template[end : slot.start()])}(?P<{slot[1]}>{of})"
+        again = f"(?P={slot[1]})" if slot[1] in seen else f"(?P<{slot[1]}>{of})"
+        pattern += re.escape(template[end : slot.start()]) + again
         end = slot.end()
+        seen.add(slot[1])
     pattern += re.escape(template[end:])
     return re.compile(pattern)
 
@@ -262,6 +272,16 @@ def _read_value(text: str) -> Shown:
 def _read_amount(text: str) -> Shown:
     decimals = _decimals(text)
     return Shown(text, lambda x: amount(x, decimals))
+
+
+def _show_estimate(of: Estimate, decimals: int) -> str:
+    low, value, high = (number(x, decimals) for x in (of.low, of.value, of.high))
+    return value if of.low == of.high else f"{value} on average ({low} to {high})"
+
+
+def _read_estimate(text: str) -> Estimate:
+    numbers = [_read_value(found) for found in re.findall(_NUMBER, text)]
+    return Estimate(numbers[0], numbers[-2 if len(numbers) > 1 else 0], numbers[-1])
 
 
 def _decimals(text: str) -> int:

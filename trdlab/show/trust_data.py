@@ -8,6 +8,7 @@ import numpy as np
 
 from trdlab.explain.trust.findings import trust_findings
 from trdlab.explain.trust.report import TrustReport
+from trdlab.explain.trust.trusted import Trust
 from trdlab.show.verdicts import trust_sentence
 
 SCHEMA = "trdlab.trust/1"
@@ -20,32 +21,38 @@ def trust_to_dict(report: TrustReport) -> dict[str, Any]:
     estimate is `value` with `low` and `high`. What does not exist, and an end of an interval that
     is infinite, is `null`.
     """
-    trust = report.trust
     return {
         "schema": SCHEMA,
         "episodes": report.num_episodes,
         "steps": report.num_steps,
         "epsilon": report.epsilon,
         "endings": _plain(report.endings),
-        "trusted": {
-            "last_step": trust.last_step,
-            "components": trust.components,
-            "at_most": trust.at_most,
-            "tested": trust.tested,
-            "residual": trust.residual,
-            "whole": trust.is_whole,
-            "doubtful": trust.doubtful.tolist(),
-        },
+        "trusted": _trust(report.trust),
         "calibration": _plain(report.calibration),
         "hidden": _plain(report.hidden),
         "blame": _plain(report.blame),
         "audit": _plain(report.audit),
         "ceiling": _plain(report.ceiling),
+        "foils": None
+        if report.foil_trust is None
+        else _trust(report.foil_trust) | {"calibration": _plain(report.foils)},
         "faults": [{"kind": type(fault).__name__, **_plain(fault)} for fault in report.faults],
         "findings": [
             _plain(finding.to_dict()) | {"sentence": trust_sentence(finding, report)}
             for finding in trust_findings(report)
         ],
+    }
+
+
+def _trust(trust: Trust) -> dict[str, Any]:
+    return {
+        "last_step": trust.last_step,
+        "components": trust.components,
+        "at_most": trust.at_most,
+        "tested": trust.tested,
+        "residual": trust.residual,
+        "whole": trust.is_whole,
+        "doubtful": trust.doubtful.tolist(),
     }
 
 

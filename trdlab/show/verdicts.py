@@ -46,6 +46,16 @@ TEMPLATES: dict[type[Claim], str] = {
         "At {component:label} its skill of {skill:value} cannot be told from that of a perfect "
         "forecast."
     ),
+    verdicts.FoilsTrustedTo: (
+        "Forecasts of first actions that are not its own can be trusted to {step:until}."
+    ),
+    verdicts.FoilsTrustedThroughout: (
+        "Forecasts of first actions that are not its own can be trusted over the whole horizon, to "
+        "{step:until}."
+    ),
+    verdicts.FoilsNotTrusted: (
+        "Forecasts of first actions that are not its own cannot be trusted at any step."
+    ),
     shortcomings.TooLate: "It expects rewards {steps:steps} too late.",
     shortcomings.TooEarly: "It expects rewards {steps:steps} too early.",
     shortcomings.AmountOff: "It expects {times:value} times as much as comes.",

@@ -164,6 +164,7 @@ def reports(draw: st.DrawFn) -> TrustReport:
         blame=blame if axis.horizon > 1 else None,
         audit=audit if axis.horizon else None,
         ceiling=draw(st.sampled_from([None, ceiling])),
+        foils=draw(st.sampled_from([None, replace(calibration, skill=estimates(judged))])),
         faults=diagnose(blame if axis.horizon > 1 else None, audit if axis.horizon else None),
     )
 

@@ -27,6 +27,9 @@ from trdlab.explain.trust.verdicts import (
     AsGoodAsCanBe,
     CannotBeKnown,
     CouldReach,
+    FoilsNotTrusted,
+    FoilsTrustedThroughout,
+    FoilsTrustedTo,
     IsNotKnown,
     NoChance,
     NoSkillAt,
@@ -53,6 +56,7 @@ def trust_findings(report: TrustReport) -> Findings:
         *_ceiling(report),
         *_faults(report),
         *_residual(report),
+        *_foils(report),
         *_sample(report),
     )
 
@@ -136,6 +140,16 @@ def _residual(report: TrustReport) -> Findings:
     ]
     if value > SHARE and least is not None:
         claims.append(WouldSuffice(least, SHARE))
+    return tuple(claim for claim in claims if claim.holds(report))
+
+
+def _foils(report: TrustReport) -> Findings:
+    found = report.foil_trust
+    if found is None or found.time_axis.horizon == 0:
+        return ()
+    claims: list[TrustFinding] = [FoilsNotTrusted()]
+    if found.last_step is not None:
+        claims = [FoilsTrustedThroughout(found.last_step), FoilsTrustedTo(found.last_step)]
     return tuple(claim for claim in claims if claim.holds(report))
 
 

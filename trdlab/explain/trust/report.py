@@ -34,6 +34,8 @@ class TrustReport:
         blame: what is wrong with the errors; None where there are no two explicit components.
         audit: how steps fit each other; None for N = 0.
         ceiling: the skill of a perfect prediction; None where states were not copied.
+        foils: how well the components of actions were predicted that the policy would not have
+            taken; None where states were not copied, or where there is no other action.
         faults: what is surely implemented wrongly.
         seconds_per_step: how long a step takes as people play, if that is known.
     """
@@ -49,8 +51,14 @@ class TrustReport:
     blame: Blame | None
     audit: Audit | None
     ceiling: Ceiling | None
+    foils: Calibration | None
     faults: tuple[Fault, ...]
     seconds_per_step: float | None = None
+
+    @property
+    def foil_trust(self) -> Trust | None:
+        """How far the forecasts of actions can be trusted that the policy would not have taken."""
+        return None if self.foils is None else trust(self.foils)
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -62,6 +70,7 @@ def judge(
     future: Future,
     episodes: Sequence[Episode],
     branches: Branches | None = None,
+    foils: Branches | None = None,
     *,
     seconds_per_step: float | None = None,
     seed: int = 0,
@@ -72,6 +81,7 @@ def judge(
         future: whose future it speaks of.
         episodes: what it predicted and what happened.
         branches: what else could have followed, for the ceiling.
+        foils: what followed other first actions than the policy's.
         seconds_per_step: how long a step takes as people play, if that is known.
         seed: of every bootstrap.
 
@@ -80,11 +90,12 @@ def judge(
     """
     samples = pool(episodes)
     axis = samples.time_axis
-    if branches is not None and branches.time_axis != axis:
-        raise InputError(
-            f"The episodes are of {axis}, the copies of {branches.time_axis}.",
-            "Play both with the same estimator.",
-        )
+    for copied in (branches, foils):
+        if copied is not None and copied.time_axis != axis:
+            raise InputError(
+                f"The episodes are of {axis}, the copies of {copied.time_axis}.",
+                "Play both with the same estimator.",
+            )
     has_neighbours = axis.horizon > 1 and axis.discounts[-2] >= MIN_DISCOUNT
     calibration = calibrate(samples, seed=seed)
     blamed = blame(samples, seed=seed) if has_neighbours else None
@@ -101,6 +112,7 @@ def judge(
         blame=blamed,
         audit=audited,
         ceiling=None if branches is None else ceiling(branches, seed=seed),
+        foils=None if foils is None else calibrate(foils.samples, seed=seed),
         faults=diagnose(blamed, audited),
         seconds_per_step=seconds_per_step,
     )

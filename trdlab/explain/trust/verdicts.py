@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trdlab.explain.finding import Claim, agrees
+from trdlab.explain.trust.calibration import Calibration
 from trdlab.explain.trust.report import TrustReport
 from trdlab.explain.trust.trusted import is_wrong, trusted
 from trdlab.statistics import Estimate
@@ -31,7 +32,7 @@ class TrustedTo(TrustFinding):
     step: int
 
     def holds(self, report: TrustReport) -> bool:
-        passed, tested = _passed(report)
+        passed, tested = _passed(report.calibration)
         return tested > 0 and passed == _ends(self.step, report) < report.time_axis.horizon
 
 
@@ -42,7 +43,7 @@ class TrustedThroughout(TrustFinding):
     step: int
 
     def holds(self, report: TrustReport) -> bool:
-        passed, tested = _passed(report)
+        passed, tested = _passed(report.calibration)
         return tested > 0 and passed == _ends(self.step, report) == report.time_axis.horizon
 
 
@@ -51,7 +52,7 @@ class NotTrusted(TrustFinding):
     """No step is to be trusted: none before the first failure was tested and passed."""
 
     def holds(self, report: TrustReport) -> bool:
-        passed, tested = _passed(report)
+        passed, tested = _passed(report.calibration)
         return tested == 0 and passed < report.time_axis.horizon
 
 
@@ -60,7 +61,7 @@ class NothingTested(TrustFinding):
     """The reward was always the same at every step, and forecast so."""
 
     def holds(self, report: TrustReport) -> bool:
-        passed, tested = _passed(report)
+        passed, tested = _passed(report.calibration)
         return tested == 0 and passed == report.time_axis.horizon > 0
 
 
@@ -213,6 +214,46 @@ class AsGoodAsCanBe(TrustFinding):
         return near and agrees(self.skill, skill.value)
 
 
+# ---- of other actions ----------------------------------------------------------------------------
+
+
+@dataclass(eq=False, repr=False)
+class FoilsTrustedTo(TrustFinding):
+    """Forecasts of actions that the policy would not have taken are trusted up to a step."""
+
+    step: int
+
+    def holds(self, report: TrustReport) -> bool:
+        if report.foils is None:
+            return False
+        passed, tested = _passed(report.foils)
+        return tested > 0 and passed == _ends(self.step, report) < report.time_axis.horizon
+
+
+@dataclass(eq=False, repr=False)
+class FoilsTrustedThroughout(TrustFinding):
+    """They are trusted at every explicit component."""
+
+    step: int
+
+    def holds(self, report: TrustReport) -> bool:
+        if report.foils is None:
+            return False
+        passed, tested = _passed(report.foils)
+        return tested > 0 and passed == _ends(self.step, report) == report.time_axis.horizon
+
+
+@dataclass(eq=False, repr=False)
+class FoilsNotTrusted(TrustFinding):
+    """They are trusted at no step."""
+
+    def holds(self, report: TrustReport) -> bool:
+        if report.foils is None:
+            return False
+        passed, tested = _passed(report.foils)
+        return tested == 0 and passed < report.time_axis.horizon
+
+
 def _limit_and_skill(report: TrustReport, component: int) -> tuple[Estimate, Estimate]:
     """Returns the ceiling and the skill of a component; NaN, of which nothing holds, if unknown."""
     unknown = Estimate(np.nan, np.nan, np.nan)
@@ -227,7 +268,7 @@ def _ends(step: int, report: TrustReport) -> int:
     return -1 if within else components
 
 
-def _passed(report: TrustReport) -> tuple[int, int]:
+def _passed(calibration: Calibration) -> tuple[int, int]:
     """Returns how many explicit components in a row are trusted, and how many were tested."""
-    passed = int(np.append(trusted(report.calibration)[:-1], False).argmin())
-    return passed, int(report.calibration.is_("judged")[:passed].sum())
+    passed = int(np.append(trusted(calibration)[:-1], False).argmin())
+    return passed, int(calibration.is_("judged")[:passed].sum())

@@ -10,8 +10,8 @@ import pytest
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.explain import gridworld_agent
-from trdlab.show import check, check_trust, explain_agent, summary
-from trdlab.show.explained import Explained, Part, parse_parts, to_dict
+from trdlab.show import explain_agent, summary
+from trdlab.show.explained import Explained, Part, check_explained, parse_parts, to_dict
 from trdlab.show.explained_plots import moment_figure, part_figure, picture_paths
 from trdlab.show.sentences import UnsupportedSentenceError
 
@@ -28,12 +28,10 @@ def test_every_sentence_of_a_summary_is_supported(name):
     texts = summary(found)
     assert found.explanation is not None
     assert found.report is not None
-    for text in texts:
-        try:
-            check(text, found.explanation)
-        except UnsupportedSentenceError:
-            check_trust(text, found.report)
-    assert 4 <= len(texts) <= 8
+    assert len(check_explained(" ".join(texts), found)) == len(texts)
+    with pytest.raises(UnsupportedSentenceError, match="no statement"):
+        check_explained("Trust me.", found)
+    assert 4 <= len(texts) <= 9
     assert texts[0].startswith("After the first action it is the future of the optimal policy")
     assert texts[1].startswith("The forecast can be trusted ")
 
@@ -67,7 +65,7 @@ def test_the_plain_data_has_the_numbers_and_their_sentences():
     assert len(calibration["ceiling"]["skill"]["value"]) == 5
     assert calibration["trusted"]["last_step"] == found.report.trust.last_step
     text = " ".join(finding["sentence"] for finding in calibration["findings"])
-    assert len(check_trust(text, found.report)) == len(calibration["findings"])
+    assert len(check_explained(text, found)) == len(calibration["findings"])
 
 
 def test_what_was_not_asked_for_is_null():

@@ -89,6 +89,7 @@ def counterfactual(
     one, other = (draws(len(of), resamples, rng) @ of / len(of) for of in futures)
     varies = np.max([np.ptp(of, axis=0) > 0.0 for of in futures], axis=0)  # [N+2]
     found = percentiles(one - other, level, branching.copies > 1)
+    ends = (np.where(varies, end, found.value) for end in (found.low, found.high))
     predicted = tried[0].predicted[0] - tried[1].predicted[0]
     return Counterfactual(
         time_axis=branching.estimator.time_axis,
@@ -97,7 +98,7 @@ def counterfactual(
         copies=branching.copies,
         whole=whole,
         predicted=np.append(predicted, (predicted if whole else predicted[:-1]).sum()),
-        observed=found.where(np.True_, varies | ~varies.any()),
+        observed=Estimates(found.value, *ends).where(np.True_, varies | ~varies.any()),
     )
 
 

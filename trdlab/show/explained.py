@@ -10,16 +10,19 @@ from rich.text import Text
 
 from trdlab.errors import InputError, closest
 from trdlab.explain.agents import Agent
-from trdlab.explain.assessment import Copying, assess
+from trdlab.explain.assessment import Copying, assess, try_out
 from trdlab.explain.explanation import Explanation, explain
-from trdlab.explain.finding import Finding
+from trdlab.explain.finding import Claim, Finding
+from trdlab.explain.tried import Trial, trial_findings
 from trdlab.explain.trust.findings import trust_findings
 from trdlab.explain.trust.report import TrustReport
 from trdlab.show.report import actions_to_dict
-from trdlab.show.sentences import sentence
+from trdlab.show.sentences import MOMENTS, sentence
+from trdlab.show.templates import Language, checked, split
 from trdlab.show.text import action_table, fit, story
-from trdlab.show.trust_data import trust_to_dict
-from trdlab.show.verdicts import trust_sentence
+from trdlab.show.trials import TRIALS, trial_sentence, trial_sentences
+from trdlab.show.trust_data import plain_data, trust_to_dict
+from trdlab.show.verdicts import REPORTS, trust_sentence
 from trdlab.time_axis import TimeAxis, axis_title
 
 Part = Literal["forecast", "contrast", "calibration"]
@@ -49,6 +52,8 @@ _MATTERS_MOST = (
     "less-costly",
     "overtakes",
 )
+_OUTCOMES = ("came-in-all", "missed-in-all", "missed-at")
+_NOT_TRIED = "It was not: the states of this environment cannot be copied."
 _MOST_OF_EACH = 2  # sentences of a kind, where only what matters most is told
 
 
@@ -63,6 +68,8 @@ class Explained:
         step: of that episode.
         explanation: of the moment; None where only the calibration was asked for.
         report: how far forecasts can be trusted; None where no episodes were played.
+        trial: what came of action and foil where they were tried; None where they were not, or
+            where states cannot be copied.
     """
 
     agent: Agent
@@ -71,6 +78,7 @@ class Explained:
     step: int
     explanation: Explanation | None
     report: TrustReport | None
+    trial: Trial | None = None
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -140,7 +148,10 @@ def explain_agent(
     if moment is not None and pair is not None:
         trusted = replace(moment, trust=None if report is None else report.trust)
         explanation = explain(trusted, *pair)
-    return Explained(agent, parts, seed, step, explanation, report)
+    trial = None
+    if pair is not None and pair[1] is not None and "contrast" in wanted:
+        trial = try_out(agent, pair[0], pair[1], seed=seed, step=step)
+    return Explained(agent, parts, seed, step, explanation, report, trial)
 
 
 def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
@@ -172,6 +183,10 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
         lines.append(action_table(moment, action, foil, ascii_only=ascii_only))
         add("")
         lines.append(story(explanation, sections=_fields(explained), ascii_only=ascii_only))
+    if "contrast" in explained.parts:
+        add("Tried out", "bold")
+        for text in [_NOT_TRIED] if explained.trial is None else trial_sentences(explained.trial):
+            add(text, indent=2)
     if "calibration" in explained.parts and explained.report is not None:
         add("How far its forecasts can be trusted", "bold")
         for text in _trust(explained.report):
@@ -198,7 +213,29 @@ def summary(explained: Explained) -> list[str]:
         most = [finding for finding in explanation.contrast if finding.kind() in _MATTERS_MOST]
         most.sort(key=lambda finding: _MATTERS_MOST.index(finding.kind()))
         texts += _told(most[:_MOST_OF_EACH], explanation)
+    if explained.trial is not None:
+        tried = [x for x in trial_findings(explained.trial) if x.kind() in _OUTCOMES]
+        texts += [trial_sentence(finding, explained.trial) for finding in tried]
     return texts
+
+
+def check_explained(text: str, explained: Explained) -> list[Claim]:
+    """Reads rendered sentences back, tests each against what it speaks of, and returns the claims.
+
+    Args:
+        text: sentences as they are printed of any part, separated by white space.
+        explained: what they speak of.
+
+    Raises:
+        UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
+    """
+    subjects: tuple[tuple[Language[Any], Any], ...] = (
+        (MOMENTS, explained.explanation),
+        (REPORTS, explained.report),
+        (TRIALS, explained.trial),
+    )
+    known = [(language, subject) for language, subject in subjects if subject is not None]
+    return [checked(piece, known) for piece in split(text)]
 
 
 def to_dict(explained: Explained) -> dict[str, Any]:
@@ -228,7 +265,23 @@ def to_dict(explained: Explained) -> dict[str, Any]:
         "future": asdict(explained.agent.estimator.future),
         "summary": summary(explained),
         "moment": moment,
+        "trial": None if explained.trial is None else _trial_to_dict(explained.trial),
         "calibration": None if report is None else trust_to_dict(report),
+    }
+
+
+def _trial_to_dict(trial: Trial) -> dict[str, Any]:
+    return {
+        "action": trial.action,
+        "foil": trial.foil,
+        "copies": trial.found.copies,
+        "scope": trial.scope,
+        "predicted": plain_data(trial.found.predicted),
+        "observed": plain_data(trial.found.observed),
+        "findings": [
+            plain_data(finding.to_dict()) | {"sentence": trial_sentence(finding, trial)}
+            for finding in trial_findings(trial)
+        ],
     }
 
 

@@ -1,9 +1,9 @@
 """Findings about a moment as English sentences, and sentences read back into findings."""
 
-from trdlab.explain import contrast, explanation, flips, forecast, limits
+from trdlab.explain import chances, contrast, explanation, flips, forecast, limits, rhythm
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.finding import Claim, Finding
-from trdlab.show.templates import Language, UnsupportedSentenceError, forms_of
+from trdlab.show.templates import Form, Language, UnsupportedSentenceError, forms_of
 
 __all__ = ["TEMPLATES", "UnsupportedSentenceError", "check", "sentence", "sentences"]
 
@@ -55,42 +55,57 @@ TEMPLATES: dict[type[Claim], str] = {
     forecast.AllBeyond: (
         "All of the {value:value} that {action} is worth lies at {component:label}."
     ),
+    forecast.NothingBefore: "Nothing is expected of {action} before {end:begin}.",
     forecast.FirstStepReward: (
-        "The first reward to be expected of {action} is that of {component:when}: "
+        "The first {effect:effect} to be expected of {action} is that of {component:when}: "
         "{reward:amount} on average, worth {discounted:value} now."
     ),
     forecast.FirstReward: (
-        "The first reward to be expected of {action} is that of {component:when}, worth "
+        "The first {effect:effect} to be expected of {action} is that of {component:when}, worth "
         "{discounted:value} now."
     ),
-    forecast.FirstStepCost: (
-        "{action} is first expected to cost something at {component:when}: {reward:amount} on "
-        "average, worth {discounted:value} now."
+    chances.PutAt: (
+        "After {action} the chance of the reward of {reward:amount} at {component:when} is put at "
+        "{chance:percent}."
     ),
-    forecast.FirstCost: (
-        "{action} is first expected to cost something at {component:when}, worth "
-        "{discounted:value} now."
+    rhythm.Rhythm: (
+        "Before {end:begin} the {effect:effect} expected of {action} peaks about every "
+        "{period:steps}, from {first:label} to {last:label}."
     ),
-    forecast.Peak: (
-        "The largest component of {action} is that of {component:when}: {discounted:value}."
+    rhythm.Peak: (
+        "Before {end:begin} the largest {effect:effect} to be expected of {action} is that of "
+        "{component:when}, worth {discounted:value} now."
+    ),
+    rhythm.Peaks: (
+        "Before {end:begin} the {effect:effect} expected of {action} peaks most clearly at "
+        "{components:labels}."
+    ),
+    rhythm.Spread: (
+        "Around {component:when} the {effect:effect} expected of {action} is spread over "
+        "{steps:steps}, {first:label} to {last:label}: either the time is uncertain, or it comes "
+        "bit by bit."
+    ),
+    forecast.OffBy: (
+        "Such forecasts of {component:when} are off by {error:value} in present worth (root mean "
+        "square)."
     ),
     forecast.CentreOfMass: (
-        "Weighted by what they are worth now, the rewards of {action} before the residual centre "
-        "on t+{step:value}."
+        "Weighted by what they are worth now, the rewards expected of {action} before {end:begin} "
+        "centre on t+{step:value}."
     ),
     forecast.ShareBeyond: "{share:percent} of the value of {action} lies at {component:label}.",
-    forecast.GiveOrTake: (
+    chances.GiveOrTake: (
         "What {action} is worth on average, {value:value}, varies by {deviation:value} from "
         "episode to episode (one standard deviation)."
     ),
-    forecast.EitherOr: (
+    chances.EitherOr: (
         "At {component:label} {action} pays either {reward:amount} or nothing; the chance that it "
         "pays is {chance:percent}."
     ),
-    forecast.LikelyOver: (
+    chances.LikelyOver: (
         "After {action} the episode is likely over by {component:begin}: {chance:percent}."
     ),
-    forecast.SurelyOver: "After {action} the episode is over by {component:begin}.",
+    chances.SurelyOver: "After {action} the episode is over by {component:begin}.",
     limits.TrustedWhole: "All that was tested of such forecasts can be trusted.",
     limits.NowhereTrusted: "Such forecasts have not proved better than a guess at any step.",
     limits.NotTrustedAt: (
@@ -115,7 +130,7 @@ TEMPLATES: dict[type[Claim], str] = {
     ),
 }
 
-LANGUAGE = Language[Explanation](
+MOMENTS = Language[Explanation](
     TEMPLATES,
     lambda told: forms_of(
         told.moment.time_axis, told.moment.action_names, told.moment.seconds_per_step
@@ -132,7 +147,7 @@ def sentences(explanation: Explanation) -> list[str]:
 
 def sentence(finding: Finding, explanation: Explanation) -> str:
     """Returns one finding as a sentence."""
-    return LANGUAGE.say(finding, explanation)
+    return MOMENTS.say(finding, explanation)
 
 
 def check(text: str, explanation: Explanation) -> list[Claim]:
@@ -145,4 +160,4 @@ def check(text: str, explanation: Explanation) -> list[Claim]:
     Raises:
         UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
     """
-    return LANGUAGE.check(text, explanation)
+    return MOMENTS.check(text, explanation)

@@ -5,7 +5,7 @@ numbers, and holds them against what they speak of.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any, Generic, TypeVar
@@ -95,24 +95,41 @@ class Language(Generic[S]):
         Raises:
             UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
         """
-        return [self._checked(piece, subject) for piece in split(text)]
+        return [checked(piece, [(self, subject)]) for piece in split(text)]
 
-    def _checked(self, piece: str, subject: S) -> Claim:
-        forms, evidence, was_read = self.forms(subject), self.evidence(subject), False
+    def claims(self, piece: str, subject: S) -> Iterator[tuple[Claim, bool]]:
+        """Yields what one sentence can be read as, each with whether it is true of a subject."""
+        forms, evidence, given = self.forms(subject), self.evidence(subject), self.given(subject)
         for kind, template in self.templates.items():
             values = read(template, piece, forms)
-            if values is None:
-                continue
-            needed = {x.name for x in fields(kind)}  # type: ignore[arg-type]
-            given = self.given(subject)
-            was_read = True
-            claim = kind(**{k: v for k, v in given.items() if k in needed} | values)
-            if claim.holds(evidence):
+            if values is not None:
+                needed = {x.name for x in fields(kind)}  # type: ignore[arg-type]
+                context = {name: value for name, value in given.items() if name in needed}
+                claim = kind(**context | values)
+                yield claim, claim.holds(evidence)
+
+
+def checked(piece: str, known: Sequence[tuple[Language[Any], Any]]) -> Claim:
+    """Returns the claim that a sentence of any of some languages makes.
+
+    Args:
+        piece: the sentence.
+        known: languages, each with what its sentences speak of.
+
+    Raises:
+        UnsupportedSentenceError: it is none of their sentences, or is not true.
+    """
+    was_read = False
+    for language, subject in known:
+        for claim, is_true in language.claims(piece, subject):
+            if is_true:
                 return claim
-        raise UnsupportedSentenceError(
-            f"The sentence '{piece}' {'is not true of' if was_read else 'is no statement about'} "
-            f"{self.about}."
-        )
+            was_read = True
+    about = " and ".join(language.about for language, _ in known)
+    raise UnsupportedSentenceError(
+        f"The sentence '{piece}' {'is not true of' if was_read else 'is no statement about'} "
+        f"{about}."
+    )
 
 
 def forms_of(

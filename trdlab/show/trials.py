@@ -43,7 +43,7 @@ TEMPLATES: dict[type[Claim], str] = {
     ),
 }
 
-LANGUAGE = Language[Trial](
+TRIALS = Language[Trial](
     TEMPLATES,
     lambda trial: forms_of(trial.found.time_axis, trial.action_names, trial.seconds_per_step),
     about="this trial",
@@ -57,7 +57,7 @@ def trial_sentences(trial: Trial) -> list[str]:
 
 def trial_sentence(finding: TrialClaim, trial: Trial) -> str:
     """Returns one finding as a sentence."""
-    return LANGUAGE.say(finding, trial)
+    return TRIALS.say(finding, trial)
 
 
 def check_trial(text: str, trial: Trial) -> list[Claim]:
@@ -70,4 +70,4 @@ def check_trial(text: str, trial: Trial) -> list[Claim]:
     Raises:
         UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
     """
-    return LANGUAGE.check(text, trial)
+    return TRIALS.check(text, trial)

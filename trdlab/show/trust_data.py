@@ -26,19 +26,19 @@ def trust_to_dict(report: TrustReport) -> dict[str, Any]:
         "episodes": report.num_episodes,
         "steps": report.num_steps,
         "epsilon": report.epsilon,
-        "endings": _plain(report.endings),
+        "endings": plain_data(report.endings),
         "trusted": _trust(report.trust),
-        "calibration": _plain(report.calibration),
-        "hidden": _plain(report.hidden),
-        "blame": _plain(report.blame),
-        "audit": _plain(report.audit),
-        "ceiling": _plain(report.ceiling),
+        "calibration": plain_data(report.calibration),
+        "hidden": plain_data(report.hidden),
+        "blame": plain_data(report.blame),
+        "audit": plain_data(report.audit),
+        "ceiling": plain_data(report.ceiling),
         "foils": None
         if report.foil_trust is None
-        else _trust(report.foil_trust) | {"calibration": _plain(report.foils)},
-        "faults": [{"kind": type(fault).__name__, **_plain(fault)} for fault in report.faults],
+        else _trust(report.foil_trust) | {"calibration": plain_data(report.foils)},
+        "faults": [{"kind": type(fault).__name__, **plain_data(fault)} for fault in report.faults],
         "findings": [
-            _plain(finding.to_dict()) | {"sentence": trust_sentence(finding, report)}
+            plain_data(finding.to_dict()) | {"sentence": trust_sentence(finding, report)}
             for finding in trust_findings(report)
         ],
     }
@@ -56,17 +56,17 @@ def _trust(trust: Trust) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:
+def plain_data(value: Any) -> Any:
     """Returns a result as what JSON knows; the time axis, which all parts share, is left out."""
     if is_dataclass(value):
         named = (field.name for field in fields(value) if field.name != "time_axis")
-        return {name: _plain(getattr(value, name)) for name in named}
+        return {name: plain_data(getattr(value, name)) for name in named}
     if isinstance(value, dict):
-        return {name: _plain(part) for name, part in value.items()}
+        return {name: plain_data(part) for name, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(part) for part in value]
+        return [plain_data(part) for part in value]
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain_data(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value

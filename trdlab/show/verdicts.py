@@ -107,7 +107,7 @@ TEMPLATES: dict[type[Claim], str] = {
 }
 
 
-LANGUAGE = Language[TrustReport](
+REPORTS = Language[TrustReport](
     TEMPLATES,
     lambda report: forms_of(report.time_axis, seconds=report.seconds_per_step),
     about="this report",
@@ -121,7 +121,7 @@ def trust_sentences(report: TrustReport) -> list[str]:
 
 def trust_sentence(finding: TrustFinding, report: TrustReport) -> str:
     """Returns one finding as a sentence."""
-    return LANGUAGE.say(finding, report)
+    return REPORTS.say(finding, report)
 
 
 def check_trust(text: str, report: TrustReport) -> list[Claim]:
@@ -134,4 +134,4 @@ def check_trust(text: str, report: TrustReport) -> list[Claim]:
     Raises:
         UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
     """
-    return LANGUAGE.check(text, report)
+    return REPORTS.check(text, report)

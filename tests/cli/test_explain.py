@@ -151,8 +151,8 @@ def test_a_run_in_another_environment(trdlab, trained):
         (["--action", "up", "--foil", "0"], "Action and foil are both 'up'."),
         (["--what", "contrst"], "There is no explanation 'contrst'. Did you mean 'contrast'?"),
         (["--what", "calibration", "--episodes", "0"], "A calibration needs episodes."),
-        (["--env", "CartPole-v1"], "'CartPole-v1' is no gridworld"),
-        (["--checkpoint", "5"], "--checkpoint is for runs"),
+        (["--env", "CartPole-v1"], "'CartPole-v1' is no exact model"),
+        (["--env-arg", "slip=0.2"], "Write gridworld:drone,slip=0.2"),
         (["--N", "-1"], "horizon N"),
     ],
 )

@@ -16,7 +16,6 @@ from trdlab.explain import (
     Copying,
     assess,
     explain,
-    find_agent,
     gridworld_agent,
 )
 from trdlab.show import check, sentences
@@ -69,10 +68,6 @@ def test_another_environment_shows_what_a_model_leaves_out(tmp_path):
     abroad = assess(gridworld_agent(own, AXIS, env=other), episodes=100)
     assert at_home.trust.is_whole
     assert not abroad.trust.is_whole
-    with pytest.raises(InputError, match="'gridworld:ledge' does not fit the agent: it has 8 "):
-        gridworld_agent(own, AXIS, env="gridworld:ledge")
-    with pytest.raises(InputError, match="'CartPole-v1' is no gridworld"):
-        gridworld_agent(own, AXIS, env="CartPole-v1")
 
 
 def test_what_is_wrong_from_some_step_on_is_marked_in_every_explanation():
@@ -127,39 +122,6 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
     agent = Agent("once", drone.estimator, ("wait", "take"), make)
     report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
     assert (report.ceiling is not None) == copyable
-
-
-def test_moments_are_steps_of_the_agents_own_episodes():
-    agent = gridworld_agent("drone", AXIS)
-    first, second = agent.moment(), agent.moment(step=1)
-    assert first.q_value("down") == pytest.approx(0.95 + 0.95**2 + 0.95**3 + 0.95**4)
-    assert second.q_value("right") == pytest.approx(1.0 + 0.95 + 0.95**2 + 0.95**3)
-    with pytest.raises(InputError, match="no step 5: the episode is over after 5 steps"):
-        agent.moment(step=5)
-    with pytest.raises(InputError, match="The step is -1"):
-        agent.moment(step=-1)
-
-
-def test_actions_are_named_or_numbered():
-    agent = gridworld_agent("drone", AXIS)
-    assert [agent.action(name) for name in ("up", "1", "9")] == ["up", "down", "9"]
-
-
-@pytest.mark.parametrize(
-    ("name", "given", "message"),
-    [
-        ("drone", {}, "no run 'drone'. For the map: gridworld:drone"),
-        ("gridworld:dron", {}, "Did you mean 'drone'"),
-        ("gridworld:drone", {"step": 3}, "--checkpoint is for runs"),
-        ("gridworld:drone", {"env_arguments": ["a=1"]}, "--env-arg is for runs"),
-        ("runs/none", {}, "There is no 'runs/none'"),
-        ("runs/none", {"time_axis": AXIS}, "A run has its own"),
-    ],
-)
-def test_agents_that_cannot_be_found(name, given, message, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match=message):
-        find_agent(name, **given)
 
 
 def test_an_agent_needs_an_episode_to_be_judged_by():

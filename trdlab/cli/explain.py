@@ -14,7 +14,9 @@ def explain(
         str,
         typer.Argument(
             metavar="AGENT",
-            help="A run's folder; or gridworld:NAME or a map file, for the exact table of it.",
+            help="A run's folder, or RUN@STEP for an older checkpoint; or an exact table: "
+            "gridworld:NAME, a map file, or tabular:ENV_ID, with arguments after commas, such as "
+            "gridworld:ledge,slip=0.2.",
         ),
     ],
     what: Annotated[
@@ -49,7 +51,9 @@ def explain(
     ] = None,
     env_arguments: Annotated[
         list[str] | None,
-        typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
+        typer.Option(
+            "--env-arg", metavar="KEY=VALUE", help="What to make the --env of a run with."
+        ),
     ] = None,
     gamma: Annotated[
         float | None,
@@ -62,10 +66,6 @@ def explain(
     width: Annotated[
         int | None,
         typer.Option("--w", help="Of an exact table: steps in each.", show_default="1"),
-    ] = None,
-    checkpoint: Annotated[
-        int | None,
-        typer.Option("--checkpoint", metavar="STEP", help="Of a run.", show_default="the newest"),
     ] = None,
     episodes: Annotated[
         int | None,
@@ -109,7 +109,6 @@ def explain(
         )
         if own_axis
         else None,
-        step=checkpoint,
         env=env,
         env_arguments=env_arguments or (),
     )

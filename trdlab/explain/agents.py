@@ -9,22 +9,37 @@ import numpy as np
 
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
+from trdlab.environments.arguments import parse_arguments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
+from trdlab.explain.copies import CopyableGymEnvironments
 from trdlab.explain.counterfactual import play_to
 from trdlab.explain.episodes import AS_PAID, Counting, Policy, decide
+from trdlab.explain.models import (
+    GRIDWORLD,
+    TABULAR,
+    Model,
+    World,
+    exact_moment,
+    gridworld_model,
+    is_model,
+    other_model,
+    tabular_model,
+)
 from trdlab.explain.moment import Moment, moment_of
-from trdlab.explain.tabular import gridworld_moment
-from trdlab.gridworld import Gridworld, load_map, map_names
-from trdlab.runs.folder import RunFolder, is_run
+from trdlab.gridworld import map_names
+from trdlab.runs.checkpoint import checkpoint_steps
+from trdlab.runs.folder import RunFolder
 from trdlab.tabular import ExactTable, exact
+from trdlab.tabular.toytext import toy_text_ids
 
 if TYPE_CHECKING:
     from trdlab.deep.settings import TrainSettings
 
-GRIDWORLD = "gridworld:"
-"""What stands before the name of a map, or its file, where an agent is named."""
+AXIS = TimeAxis(0.95, 4)
+"""Of an exact table, where nothing is said."""
+
+_DIGITS = 19  # more are no number of steps
 
 Make = Callable[[int, int], Environments]
 """From the number of environments and their seed to the environments."""
@@ -41,8 +56,10 @@ class Agent:
         make: makes the environments that it acts in.
         policy: what the estimator describes, where that is not its own greedy policy.
         counting: which rewards it counts, and what ends its future.
-        world: the gridworld that it is the exact table of; None if it was learned.
+        world: what it is the exact table of; None if it was learned.
         seconds_per_step: how long one of its steps takes as people play, if that is known.
+        words: what names it on the command line, and what `make` makes if that is not its own.
+        place: the options that name what `make` makes.
     """
 
     name: str
@@ -51,8 +68,10 @@ class Agent:
     make: Make
     policy: Policy | None = None
     counting: Counting = AS_PAID
-    world: Gridworld | None = None
+    world: World | None = None
     seconds_per_step: float | None = None
+    words: tuple[str, ...] = ()
+    place: tuple[str, ...] = ()
 
     def action(self, name: str) -> str:
         """Returns the name of an action that is given by its name or its number."""
@@ -78,7 +97,7 @@ class Agent:
         finally:
             environments.close()
         if self.world is not None and isinstance(self.estimator, ExactTable):
-            return gridworld_moment(self.world, self.estimator, int(stack.observations[0]))
+            return exact_moment(self.world, self.estimator, int(stack.observations[0]))
         chosen = decide(self.estimator, stack.observations, self.policy).probabilities[0]
         moment = moment_of(self.estimator, stack.observations[0], self.action_names)
         policy = np.asarray(chosen, dtype=np.float64)
@@ -89,49 +108,56 @@ def gridworld_agent(map_name: str, time_axis: TimeAxis, *, env: str | None = Non
     """Returns the exact table of a gridworld as an agent that acts optimally in it.
 
     Args:
-        map_name: the name of a built-in map, or a file; `gridworld:` may stand before it.
+        map_name: a built-in map, or a file, and after commas what to make it with, such as
+            `ledge,slip=0.2`; `gridworld:` may stand before it.
         time_axis: γ, N and w.
-        env: another map to act in instead, with as many states.
+        env: another exact model to act in instead, with the same states.
 
     Raises:
-        InputError: a map cannot be read, or the other one does not fit.
+        InputError: a map cannot be read, or the other model does not fit.
     """
-    world = Gridworld(load_map(map_name.removeprefix(GRIDWORLD)))
-    table = exact(world.mdp, time_axis)
-    there = world if env is None else _other_map(world, env)
-    rows, columns = there.grid.shape
-    limit = max(100, 4 * rows * columns, 4 * time_axis.num_steps)
+    called = GRIDWORLD + map_name.removeprefix(GRIDWORLD)
+    return _exact_agent(called, gridworld_model(map_name), time_axis, env)
 
-    def make(num_envs: int, seed: int) -> Environments:
-        names = there.action_names
-        return ModelEnvironments(
-            there.mdp, num_envs, seed=seed, time_limit=limit, action_names=names
-        )
 
+def tabular_agent(env_id: str, time_axis: TimeAxis, *, env: str | None = None) -> Agent:
+    """Returns the exact table of an environment's model as an agent that acts optimally in it.
+
+    Args:
+        env_id: a Gymnasium environment with a transition table, and after commas what to make it
+            with, such as `FrozenLake-v1,is_slippery=false`; `tabular:` may stand before it.
+        time_axis: γ, N and w.
+        env: another exact model to act in instead, with the same states.
+
+    Raises:
+        InputError: there is no such environment, it has no table, or the other one does not fit.
+    """
+    called = TABULAR + env_id.removeprefix(TABULAR)
+    return _exact_agent(called, tabular_model(env_id), time_axis, env)
+
+
+def _exact_agent(called: str, model: Model, time_axis: TimeAxis, env: str | None) -> Agent:
+    there = model if env is None else other_model(env, model.world)
+    table = exact(model.world.mdp, time_axis)
+    place = ("--env", called if env is None else env)
     return Agent(
-        name=world.grid.name,
+        name=model.name,
         estimator=table,
-        action_names=world.action_names,
-        make=make,
+        action_names=model.world.action_names,
+        make=lambda num_envs, seed: there.environments(num_envs, seed, time_axis),
         policy=lambda states: table.solution.policy[states],
-        world=world,
+        world=model.world,
+        words=(called, *_axis_words(time_axis), *(() if env is None else place)),
+        place=place,
     )
 
 
-def _other_map(world: Gridworld, env: str) -> Gridworld:
-    if not env.startswith(GRIDWORLD) and not Path(env).is_file():
-        raise InputError(
-            f"'{env}' is no gridworld, and the agent is the exact table of one.",
-            f"Give {GRIDWORLD}NAME, or a map file.",
-        )
-    other = Gridworld(load_map(env.removeprefix(GRIDWORLD)))
-    if other.mdp.shape != world.mdp.shape:
-        raise InputError(
-            f"'{env}' does not fit the agent: it has {other.mdp.num_states} states, and the agent "
-            f"knows {world.mdp.num_states}.",
-            "Give a map with the same states, such as the same one with another slip.",
-        )
-    return other
+def _axis_words(axis: TimeAxis) -> tuple[str, ...]:
+    """Returns the options of an exact table's axis, but for what goes without saying."""
+    own = (("--gamma", axis.gamma), ("--N", axis.horizon), ("--w", axis.width))
+    usual = (AXIS.gamma, AXIS.horizon, AXIS.width)
+    said = (pair for pair, value in zip(own, usual, strict=True) if pair[1] != value)
+    return tuple(str(word) for pair in said for word in pair)
 
 
 def run_agent(
@@ -175,20 +201,24 @@ def run_agent(
     finally:
         environments.close()
     names = tuple(told["action_names"])
+    at = "" if step is None else f"@{step}"
     per_second = told["frames_per_second"]
+    given = (word for argument in settings.env_arg for word in ("--env-arg", argument))
+    place = ("--env", settings.env, *given)
     return Agent(
-        name=folder.path.name,
+        name=f"{folder.path.name}{at}",
         estimator=estimator,
         action_names=names or tuple(f"action {i}" for i in range(told["num_actions"])),
         make=make,
         counting=Counting(settings.clip_rewards, settings.life_loss_ends),
         seconds_per_step=told["frame_skip"] / per_second if per_second else None,
+        words=(f"{path}{at}", *(() if env is None else place)),
+        place=place,
     )
 
 
 def _environments(settings: "TrainSettings", num_envs: int, seed: int) -> Environments:
     """Returns the environments of a run, such that their states can be copied where possible."""
-    from trdlab.environments.arguments import parse_arguments
     from trdlab.training.setup import make_environments
 
     if settings.kind == "atari":
@@ -227,31 +257,60 @@ def find_agent(
     name: str,
     *,
     time_axis: TimeAxis | None = None,
-    step: int | None = None,
     env: str | None = None,
     env_arguments: Sequence[str] = (),
 ) -> Agent:
-    """Returns an agent by its name: a run's folder, `gridworld:NAME`, or a map file.
+    """Returns an agent by its name.
+
+    That is a run's folder, or `RUN@STEP` for an older checkpoint of it; or, for the exact table of
+    a model, `gridworld:NAME`, a map file, or `tabular:ENV_ID`, each with what to make it with after
+    commas, such as `gridworld:ledge,slip=0.2`.
 
     Args:
         name: of the agent.
         time_axis: of an exact table, by default γ = 0.95, N = 4, w = 1; a run has its own.
-        step: of an older checkpoint of a run.
         env: an environment to act in instead of its own.
-        env_arguments: what to make that one with.
+        env_arguments: what to make the other environment of a run with.
 
     Raises:
         InputError: there is no such agent, or something does not fit it.
         TrdlabError: a run is torn.
     """
-    path = Path(name)
-    if name.startswith(GRIDWORLD) or (path.is_file() and not is_run(path)):
-        if step is not None or env_arguments:
-            given = "--checkpoint" if step is not None else "--env-arg"
-            raise InputError(f"{given} is for runs, and '{name}' is a map.", "Leave it out.")
-        return gridworld_agent(name, time_axis or TimeAxis(0.95, 4), env=env)
-    if name in map_names() and not path.exists():
-        raise InputError(f"There is no run '{name}'.", f"For the map: {GRIDWORLD}{name}")
+    if is_model(name):
+        if env_arguments:
+            raise InputError(
+                f"--env-arg is for runs, and '{name}' is an exact table.",
+                f"Write {name},{','.join(env_arguments)}",
+            )
+        of = tabular_agent if name.startswith(TABULAR) else gridworld_agent
+        return of(name, time_axis or AXIS, env=env)
+    _refuse_model(name)
     if time_axis is not None:
         raise InputError("A run has its own γ, N and w.", "Leave out --gamma, --N and --w.")
+    path, step = _checkpoint(name)
     return run_agent(path, step=step, env=env, env_arguments=env_arguments)
+
+
+def _refuse_model(name: str) -> None:
+    """Refuses the name of a model without its kind, where no run is called that."""
+    called = name.partition(",")[0]
+    if Path(name).exists():
+        return
+    if called in map_names():
+        raise InputError(f"There is no run '{name}'.", f"For the map: {GRIDWORLD}{name}")
+    if called in toy_text_ids():
+        raise InputError(f"There is no run '{name}'.", f"For the exact table: {TABULAR}{name}")
+
+
+def _checkpoint(name: str) -> tuple[Path, int | None]:
+    """Returns the folder of a run, and the step of the checkpoint that is named after an `@`."""
+    folder, at, step = name.rpartition("@")
+    if not at or not folder or Path(name).exists():
+        return Path(name), None
+    if step.isdecimal() and len(step) < _DIGITS:
+        return Path(folder), int(step)
+    steps = checkpoint_steps(RunFolder.open(Path(folder)))
+    raise InputError(
+        f"'{step}' is no step of a checkpoint of '{folder}'.",
+        f"There are: {', '.join(map(str, steps))}." if steps else "There is none yet.",
+    )

@@ -8,6 +8,7 @@ from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.explain.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
+from trdlab.tabular.models import part_after
 from trdlab.tabular.reach import reached
 from trdlab.tabular.uncertainty import outcomes, spread
 
@@ -82,6 +83,19 @@ def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
             low, high = sorted((0.0, REWARD_RANGE * source.value))
             what_ifs.append(WhatIf(source_name(world, source), source.value, low, high, solver))
     return tabular_moment(table, state, world.action_names, what_ifs)
+
+
+def gamma_what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
+    """Returns γ as a quantity that can be varied, where few enough states can follow.
+
+    Args:
+        table: the exact decomposition.
+        state: the index of the state.
+    """
+    gamma, part = table.time_axis.gamma, part_after(table.mdp, state)
+    if part.num_states > MAX_WHAT_IF_STATES:
+        return []
+    return [gamma_what_if(part, gamma, part.start)]
 
 
 def gamma_what_if(mdp: MDP, gamma: float, state: int) -> WhatIf:

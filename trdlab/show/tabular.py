@@ -9,12 +9,11 @@ from trdlab.decomposition import TimeAxis
 from trdlab.environments.arguments import say_arguments
 from trdlab.explain.contrast import difference
 from trdlab.explain.explanation import explain
-from trdlab.explain.moment import Moment, WhatIf
-from trdlab.explain.tabular import MAX_WHAT_IF_STATES, gamma_what_if, tabular_moment
+from trdlab.explain.moment import Moment
+from trdlab.explain.tabular import gamma_what_ifs, tabular_moment
 from trdlab.formatting import plain
 from trdlab.show.report import Report, Scene
-from trdlab.tabular import ExactTable, Ties, exact
-from trdlab.tabular.models import part_after
+from trdlab.tabular import Ties, exact
 from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.toytext import make_world
 
@@ -56,7 +55,7 @@ def report(
     world = make_world(env_id, given)
     index = world.mdp.start if state is None else world.find_state(state)
     table = exact(world.mdp, axis, ties=ties)
-    moment = tabular_moment(table, index, world.action_names, _what_ifs(table, index))
+    moment = tabular_moment(table, index, world.action_names, gamma_what_ifs(table, index))
     scene = _scene(world, index, _next_step(env_id, world, given, axis), given)
     if foil is None:
         foil = _other(moment, action)
@@ -72,14 +71,6 @@ def _other(moment: Moment, action: str | None) -> str | None:
     names = sorted(moment.action_names, key=moment.q_value, reverse=True)
     others = (n for n in names if n != action and difference(moment, action, n).any())
     return foil or next(others, None)
-
-
-def _what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
-    """Returns γ as a quantity that can be varied, where few enough states can follow."""
-    gamma, part = table.time_axis.gamma, part_after(table.mdp, state)
-    if part.num_states > MAX_WHAT_IF_STATES:
-        return []
-    return [gamma_what_if(part, gamma, part.start)]
 
 
 def _scene(world: TabularWorld, state: int, next_step: str, given: Mapping[str, Any]) -> Scene:

@@ -17,6 +17,7 @@ COMMANDS = {
     "resume": "trdlab.cli.train",
     "evaluate": "trdlab.cli.train",
     "runs": "trdlab.cli.train",
+    "study": "trdlab.cli.study",
 }
 """The module of each command, where it is the function, or the group, of the same name."""
 

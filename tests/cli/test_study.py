@@ -1,0 +1,63 @@
+"""`trdlab study` as a lecturer uses it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from trdlab.cli import main
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(("study", *words))
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+@pytest.fixture
+def kit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    code, out, err = run(
+        capsys, "make", "--out", str(tmp_path / "kit"), "--trials", "6", "--seed", "4"
+    )
+    assert (code, out) == (0, "")
+    assert err.count("Written: ") == 3
+    return tmp_path / "kit"
+
+
+def test_a_class_is_scored(kit: Path, capsys: pytest.CaptureFixture[str]):
+    right = json.loads((kit / "answers.json").read_text())["answers"]
+    given = kit / "given.json"
+    given.write_text(json.dumps({"Ada": right, "reader 1": "AAAAAA"}))
+    words = ("score", str(kit / "answers.json"), str(given), "--answers", right.lower())
+    code, out, err = run(capsys, *words, "--json")
+    assert (code, err) == (0, "")
+    data = json.loads(out)
+    counts = {name: of["right"] for name, of in data["readers"].items()}
+    assert counts == {"Ada": 6, "reader 1": 2, "reader 2": 6}
+    assert data["overall"]["right"] == 14
+    code, out, _ = run(capsys, *words)
+    assert code == 0
+    assert "14 of 18 answers are right (78 %); guessing gets 33 % on average." in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("make", "--out", "{kit}"), "study.html' exists. Choose another --out."),
+        (("make", "--out", "{kit}/new", "--trials", "7"), "There cannot be 7 trials."),
+        (("score", "{kit}/answers.json"), "There are no answers. Give at least one reader's."),
+        (("score", "{kit}/answers.json", "--answers", "ABC"), "reader 1 gave 3 answers"),
+        (("score", "{kit}/study.html", "--answers", "ABC"), "is torn"),
+    ],
+)
+def test_bad_input_is_one_clear_line(
+    words: tuple[str, ...], message: str, kit: Path, capsys: pytest.CaptureFixture[str]
+):
+    code, out, err = run(capsys, *(word.format(kit=kit) for word in words))
+    assert code in (1, 2)
+    assert out == ""
+    assert err.startswith("error: ")
+    assert message in err
+    assert err.count("\n") == 1
+    assert not (kit / "new").exists()

@@ -1,0 +1,1 @@
+"""A blind reading: does the printed text alone tell which of three agents it is about?"""

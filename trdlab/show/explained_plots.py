@@ -11,6 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from trdlab.errors import OutputError
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.moment import Moment
+from trdlab.explain.tried import Trial
 from trdlab.explain.trust.report import TrustReport
 from trdlab.files import check_output, write_whole
 from trdlab.show.explained import PARTS, Explained, Part
@@ -88,13 +89,17 @@ def part_figure(explained: Explained, part: Part) -> Figure | None:
         return None
     foil = explanation.foil if part == "contrast" else None
     title = f"{explained.agent.name}, step {explained.step} of the episode with seed"
-    return moment_figure(explanation, foil, f"{title} {explained.seed}")
+    trial = explained.trial if part == "contrast" else None
+    return moment_figure(explanation, foil, f"{title} {explained.seed}", trial=trial)
 
 
-def moment_figure(explanation: Explanation, foil: str | None, title: str) -> Figure:
+def moment_figure(
+    explanation: Explanation, foil: str | None, title: str, *, trial: Trial | None = None
+) -> Figure:
     """Returns the bars of an action; with a foil, those of both and of their difference.
 
-    What is not to be trusted is faded.
+    What is not to be trusted is faded. Where action and foil were tried, what came of their
+    difference stands over the bars that were forecast.
     """
     moment, action = explanation.moment, explanation.action
     names = [action] if foil is None else [action, foil]
@@ -110,6 +115,8 @@ def moment_figure(explanation: Explanation, foil: str | None, title: str) -> Fig
         ax.set_title(f"{name}: worth {moment.q_value(name):.3g} in all", fontsize=10, loc="left")
     if foil is not None:
         plot_contrast(axes[-1], moment, action, foil)
+        if trial is not None:
+            plot_trial(axes[-1], trial)
         share_scale(axes[:-1])
     for ax in axes:
         fade(ax, moment)
@@ -135,6 +142,41 @@ def fade(ax: Axes, moment: Moment) -> Axes:
         for bar, is_doubtful in zip(ax.patches, trust.doubtful, strict=True):
             if is_doubtful:
                 bar.set_alpha(_FADED)
+    return ax
+
+
+def plot_trial(ax: Axes, trial: Trial) -> Axes:
+    """Draws what came of the difference of two actions that were tried, over its bars.
+
+    Args:
+        ax: the axes with the bars of the difference, as `plot_contrast` draws them.
+        trial: of the same two actions.
+
+    Returns:
+        `ax`.
+    """
+    found = trial.found
+    bars = [bar.get_path().get_extents(bar.get_patch_transform()) for bar in ax.patches]
+    x = np.array([0.25 * bar.x0 + 0.75 * bar.x1 for bar in bars])  # right of the numbers
+    y, low, high = (
+        of[:-1] for of in (found.observed.value, found.observed.low, found.observed.high)
+    )
+    known = ~np.isnan(y)
+    reach = np.nan_to_num(np.array([y - low, high - y]))[:, known]  # no bar without an interval
+    ax.errorbar(
+        x[known],
+        y[known],
+        yerr=reach,
+        fmt="D",
+        color="black",
+        markerfacecolor="white",
+        markersize=5,
+        capsize=3,
+        linewidth=1.2,
+        label=f"as it came, each tried {found.copies} times",
+    )
+    ax.margins(y=0.25)
+    ax.legend(loc="best", fontsize=8, frameon=False)
     return ax
 
 

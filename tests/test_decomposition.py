@@ -414,3 +414,27 @@ def test_what_is_too_large_for_a_table_is_shown_by_its_shape():
         for text in (repr(large), rendered(large), large._repr_html_()):
             assert str(shape) in text.replace("\n", " ")
             assert len(text) < 200
+
+
+def test_two_axes_share_the_finest_one_that_both_can_be_brought_to():
+    assert TimeAxis(0.9, 10).shared(TimeAxis(0.9, 4)) == TimeAxis(0.9, 4)
+    assert TimeAxis(0.9, 10).shared(TimeAxis(0.9, 4, 3)) == TimeAxis(0.9, 3, 3)
+    assert TimeAxis(0.9, 6, 2).shared(TimeAxis(0.9, 4, 3)) == TimeAxis(0.9, 2, 6)
+    assert TimeAxis(0.9, 3, 2).shared(TimeAxis(0.9, 1, 5)) == TimeAxis(0.9, 0, 10)
+    with pytest.raises(InputError, match=r"discount factors differ: 0\.9 and 0\.95"):
+        TimeAxis(0.9, 4).shared(TimeAxis(0.95, 4))
+
+
+def test_a_decomposition_is_brought_to_a_coarser_axis():
+    fine = RewardDecomposition([[1.0, 2.0, 4.0, 8.0, 16.0, 32.0]] * 2, TimeAxis(0.9, 5))
+    coarse = fine.on(TimeAxis(0.9, 2, 2))
+    assert coarse.time_axis == TimeAxis(0.9, 2, 2)
+    assert coarse.components.tolist() == [[1 + 2, 4 + 8, 16 + 32]] * 2
+    assert fine.on(TimeAxis(0.9, 3)).components[0].tolist() == [1, 2, 4, 8 + 16 + 32]
+    assert fine.on(TimeAxis(0.9, 0, 7)).components[0].tolist() == [63]
+    assert fine.on(TimeAxis(0.9, 5)).components.tolist() == fine.components.tolist()
+    for axis in (TimeAxis(0.9, 6), TimeAxis(0.9, 3, 2)):
+        with pytest.raises(InputError, match="cannot be brought to"):
+            fine.on(axis)
+    with pytest.raises(InputError, match="cannot be brought to"):
+        coarse.on(TimeAxis(0.9, 2))

@@ -131,6 +131,32 @@ class RewardDecomposition:
             np.concatenate([groups, self.components[..., -1:]], axis=-1), axis
         )
 
+    def on(self, axis: TimeAxis) -> "RewardDecomposition":
+        """Returns the same rewards on a coarser axis: late components fold into the residual.
+
+        Args:
+            axis: with a width that is a multiple of the present one, and no more steps before the
+                residual (see `TimeAxis.shared`).
+
+        Raises:
+            InputError: it is another discount factor, or a finer axis.
+
+        >>> fine = RewardDecomposition([0, 0.95, 0.9, 0.86, 0.81], TimeAxis(0.95, horizon=4))
+        >>> fine.on(TimeAxis(0.95, horizon=1, width=3)).components.round(2).tolist()
+        [1.85, 1.67]
+        """
+        own = self.time_axis
+        if own.shared(axis) != axis:
+            raise InputError(
+                f"{own} cannot be brought to {axis}.",
+                f"The nearest that it can is {own.shared(axis)}.",
+            )
+        kept = axis.num_steps // own.width
+        beyond = self.components[..., kept:].sum(axis=-1, keepdims=True)  # [..., 1]
+        folded = np.concatenate([self.components[..., :kept], beyond], axis=-1)
+        groups = TimeAxis(own.gamma, kept, own.width)
+        return RewardDecomposition(folded, groups).regroup(axis.width)
+
     def undiscounted(self) -> FloatArray:
         """Returns `[..., N]`: the expected reward of each explicit step, c_i / γ^i (w = 1 only).
 

@@ -117,6 +117,26 @@ class TimeAxis:
             )
         return TimeAxis(self.gamma, self.num_steps // width, width)
 
+    def shared(self, other: "TimeAxis") -> "TimeAxis":
+        """Returns the finest axis that decompositions on either can be brought to (see `on`).
+
+        Its width is the least common multiple of both; its residual starts where the first
+        residual does, or before, if the last group would be short.
+
+        Raises:
+            InputError: the discount factors differ.
+
+        >>> TimeAxis(0.9, horizon=10).shared(TimeAxis(0.9, horizon=4, width=3)).labels
+        ('t…t+2', 't+3…t+5', 't+6…t+8', 't+9…∞')
+        """
+        if self.gamma != other.gamma:
+            raise InputError(
+                f"The discount factors differ: {self.gamma:g} and {other.gamma:g}.",
+                "Rewards discounted differently cannot be compared.",
+            )
+        width = math.lcm(self.width, other.width)
+        return TimeAxis(self.gamma, min(self.num_steps, other.num_steps) // width, width)
+
     def _checked(self, component: int) -> int:
         if not 0 <= component <= self.horizon:
             raise InputError(

@@ -10,7 +10,7 @@ from ale_py import AtariVectorEnv
 
 import trdlab.atari.environments
 from trdlab.atari import AtariEnvironments
-from trdlab.environments import NotReproducible, Step
+from trdlab.environments import NotCopyable, NotReproducible, Step
 from trdlab.environments.stack import FrameStack, observation_space
 from trdlab.errors import InputError, TrdlabError
 
@@ -68,6 +68,26 @@ def test_restored_to_the_bit_in_the_middle_of_a_game(monkeypatch, num_envs, stic
         frames = again.load_state_dict(state)
         np.testing.assert_array_equal(frames, before[-1].following)
         assert all(map(same, after, acted(again, 150, seed=1)))
+
+
+def test_copies_go_on_as_the_games_do():
+    games = AtariEnvironments("Breakout", 2, seed=1)
+    games.reset()
+    steps = acted(games, 150) + acted(games, 40, seed=1)
+    assert any(step.ended.any() for step in steps), "a copy plays more than one game again"
+    copies = games.branch(np.array([1, 0, 1]), seed=5)
+    for first, second in np.random.default_rng(2).integers(4, size=(30, 2)):
+        original, copied = (
+            games.step(np.array([first, second])),
+            copies.step(np.array([second, first, (second + 1) % 4])),
+        )
+        np.testing.assert_array_equal(copied.frames[:2], original.frames[::-1])
+        np.testing.assert_array_equal(copied.rewards[:2], original.rewards[::-1])
+        np.testing.assert_array_equal(copied.terminated[:2], original.terminated[::-1])
+        np.testing.assert_array_equal(copied.life_lost[:2], original.life_lost[::-1])
+    assert (copied.frames[2] != copied.frames[0]).any(), "each goes its own way"
+    with pytest.raises(NotCopyable, match="sticky"):
+        AtariEnvironments("Breakout", 1, seed=1, sticky=0.25).branch(np.array([0]), seed=0)
 
 
 def test_same_seed_same_games_and_each_game_another():

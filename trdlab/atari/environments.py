@@ -1,6 +1,6 @@
 """Atari games that step together, restorable to the bit."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -10,7 +10,7 @@ from trdlab.arrays import BoolArray, IntArray
 from trdlab.atari.names import find_game
 from trdlab.atari.vector import FRAME, FRAMES_PER_SECOND, STACK, action_names, make_vector
 from trdlab.environments.history import Histories, checked_actions
-from trdlab.environments.protocol import Frames, Padding, Step
+from trdlab.environments.protocol import Frames, NotCopyable, NotReproducible, Padding, Step
 
 RESEED_AFTER = 5000
 """Steps after which a game is seeded anew at the end of its episode.
@@ -77,6 +77,7 @@ class AtariEnvironments:
             "frame_skip": frame_skip,
             "full_action_space": full_action_space,
         }
+        self._options = options
         settings = {"game": self.game, **options}
         self._histories = Histories(
             settings, num_envs=num_envs, seed=seed, reseed_after=RESEED_AFTER
@@ -117,24 +118,43 @@ class AtariEnvironments:
             NotReproducible: a game does not do again what it did.
         """
         past = self._histories.saved(state)
-        lengths = np.array([len(actions) for _, actions in past])
-        waits = lengths.max() - lengths  # [B]: they begin apart, and come to the present together
-        padded = [
-            np.pad(actions, (wait, 0)) for (_, actions), wait in zip(past, waits, strict=True)
-        ]
-        following: Frames = self._envs.reset()[0]  # those that wait play something meanwhile
-        for moment in range(int(lengths.max()) + 1):
-            begins = waits == moment
-            if begins.any():
-                envs = np.flatnonzero(begins).tolist()
-                following = self._begin(
-                    begins, [self._histories.begin(env, past[env][0]) for env in envs]
-                )
-            if moment < lengths.max():
-                actions = np.array([row[moment] for row in padded])
-                following = self._act(actions).following
+        following = self._play_again(
+            [actions for _, actions in past],
+            lambda env: self._histories.begin(env, past[env][0]),
+        )
         self._histories.verify(state, self.game)
         return following
+
+    def branch(self, which: IntArray, seed: int) -> "AtariEnvironments":
+        """Returns copies of the games `which [B′]`: they play again what was played.
+
+        Without sticky actions there is no chance in a game, so only what the agent does can make
+        two copies differ.
+
+        Raises:
+            NotCopyable: actions are sticky; a copy would repeat the chance of the game.
+            NotReproducible: a game does not do again what it did.
+        """
+        if self._options["sticky"]:
+            raise NotCopyable(
+                f"{self.game} has sticky actions, whose chance a copy would repeat.",
+                "Play without them, or ask for no ceiling and no foils.",
+            )
+        copies = AtariEnvironments(self.game, len(which), seed=seed, **self._options)
+        past = [self._histories.past(env) for env in which.tolist()]
+
+        def begin(copy: int) -> int:
+            copies._histories.begin(copy)
+            return past[copy][0]
+
+        copies._play_again([actions for _, actions in past], begin)
+        for copy, env in enumerate(which.tolist()):
+            if not copies._histories.same(copy, self._histories, env):
+                raise NotReproducible(
+                    f"{self.game} did something else when it was played again.",
+                    "Ask for no ceiling and no foils.",
+                )
+        return copies
 
     def close(self) -> None:
         """Nothing: ale-py's threads end with the object."""
@@ -152,6 +172,26 @@ class AtariEnvironments:
                 ended, [self._next_seed(e) for e in np.flatnonzero(ended).tolist()]
             )
         return Step(frames, rewards, terminated, truncated, life_lost, following)
+
+    def _play_again(self, past: Sequence[IntArray], begin: Callable[[int], int]) -> Frames:
+        """Plays games again, side by side; returns the frames the next action is chosen at.
+
+        Args:
+            past: of each game, the actions to take.
+            begin: from the number of a game to the seed to begin it with.
+        """
+        lengths = np.array([len(actions) for actions in past])
+        waits = lengths.max() - lengths  # [B]: they begin apart, and come to the present together
+        padded = [np.pad(actions, (wait, 0)) for actions, wait in zip(past, waits, strict=True)]
+        following: Frames = self._envs.reset()[0]  # those that wait play something meanwhile
+        for moment in range(int(lengths.max()) + 1):
+            begins = waits == moment
+            if begins.any():
+                following = self._begin(begins, [begin(e) for e in np.flatnonzero(begins).tolist()])
+            if moment < lengths.max():
+                actions = np.array([row[moment] for row in padded])
+                following = self._act(actions).following
+        return following
 
     def _next_seed(self, env: int) -> int:
         return self._histories.begin(env) if self._histories.is_due(env) else _UNSEEDED

@@ -2,7 +2,14 @@
 
 from typing import TYPE_CHECKING
 
-from trdlab.environments.protocol import Environments, NotReproducible, Padding, Step
+from trdlab.environments.protocol import (
+    CopyableEnvironments,
+    Environments,
+    NotCopyable,
+    NotReproducible,
+    Padding,
+    Step,
+)
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
@@ -10,8 +17,10 @@ if TYPE_CHECKING:
     from trdlab.environments.making import make_environment
 
 __all__ = [
+    "CopyableEnvironments",
     "Environments",
     "GymEnvironments",
+    "NotCopyable",
     "NotReproducible",
     "Padding",
     "Step",

@@ -60,8 +60,15 @@ class Histories:
         self._seedings[env] = self._seedings[env] + 1 if seeding is None else seeding
         self._actions[env] = array("i")
         self._checksums[env] = 0
-        words = np.random.SeedSequence([self._seed, env, int(self._seedings[env])])
-        return int(words.generate_state(1)[0] >> 1)  # 31 bits: ALE's seeds are signed
+        return self._seed_of(env)
+
+    def past(self, env: int) -> tuple[int, IntArray]:
+        """Returns the seed of an environment's last seeded reset, and its actions since."""
+        return self._seed_of(env), np.array(self._actions[env], dtype=np.int64)
+
+    def same(self, env: int, other: "Histories", other_env: int) -> bool:
+        """Returns whether two environments have shown the same since they were last seeded."""
+        return self._checksums[env] == other._checksums[other_env]
 
     def is_due(self, env: int) -> bool:
         """Whether the next reset of an environment should be a seeded one."""
@@ -131,6 +138,10 @@ class Histories:
                 f"again from the same seed (environment {env}).",
                 "Begin new episodes with reset().",
             )
+
+    def _seed_of(self, env: int) -> int:
+        words = np.random.SeedSequence([self._seed, env, int(self._seedings[env])])
+        return int(words.generate_state(1)[0] >> 1)  # 31 bits: ALE's seeds are signed
 
 
 def checked_actions(actions: Any, num_envs: int, num_actions: int) -> IntArray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy.typing as npt
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.errors import TrdlabError
+from trdlab.errors import InputError, TrdlabError
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -18,6 +18,10 @@ Padding = Literal["reset", "zero"]
 
 class NotReproducible(TrdlabError):  # noqa: N818  it says what an environment is, not what failed
     """An environment did something else when the same seed and actions were given again."""
+
+
+class NotCopyable(InputError):  # noqa: N818  it says what an environment is, not what failed
+    """An environment of which no copies can be made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,4 +102,20 @@ class Environments(Protocol):
 
     def close(self) -> None:
         """Lets go of what the environments hold."""
+        ...
+
+
+class CopyableEnvironments(Environments, Protocol):
+    """Environments of which copies can be made, in the middle of their episodes."""
+
+    def branch(self, which: IntArray, seed: int) -> "CopyableEnvironments":
+        """Returns copies that go on from where these are, each by a chance of its own.
+
+        Args:
+            which: `[B′]`, the number of the environment that each copy is made of.
+            seed: of the chance from here on.
+
+        Raises:
+            NotCopyable: they cannot be copied after all.
+        """
         ...

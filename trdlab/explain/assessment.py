@@ -6,11 +6,10 @@ from typing import TypeGuard
 
 import numpy as np
 
-from trdlab.environments import Environments
+from trdlab.environments import CopyableEnvironments, Environments, NotCopyable
 from trdlab.errors import InputError
 from trdlab.explain.agents import Agent
 from trdlab.explain.branches import Branches, Branching
-from trdlab.explain.copies import CopyableEnvironments, NotCopyable
 from trdlab.explain.counterfactual import counterfactual, play_to
 from trdlab.explain.episodes import Episode, collect
 from trdlab.explain.tried import Trial

@@ -7,10 +7,10 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
+from trdlab.environments import CopyableEnvironments
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.explain.copies import CopyableEnvironments
 from trdlab.explain.episodes import AS_PAID, Counting, Decision, Policy, decide
 from trdlab.explain.trust.followed import Samples
 

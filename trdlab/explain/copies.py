@@ -2,34 +2,17 @@
 
 from collections.abc import Mapping
 from copy import copy, deepcopy
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import gymnasium as gym
 import numpy as np
 
 from trdlab.arrays import FloatArray, IntArray
-from trdlab.environments import Environments, Padding, Step
+from trdlab.environments import NotCopyable, Padding, Step
 from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.history import Histories, checked_actions
 from trdlab.errors import InputError
 from trdlab.tabular import MDP
-
-
-class NotCopyable(InputError):  # noqa: N818  it says what an environment is, not what failed
-    """An environment of which no copies can be made."""
-
-
-class CopyableEnvironments(Environments, Protocol):
-    """Environments of which copies can be made, in the middle of their episodes."""
-
-    def branch(self, which: IntArray, seed: int) -> "CopyableEnvironments":
-        """Returns copies that go on from where these are, each by a chance of its own.
-
-        Args:
-            which: `[B′]`, the number of the environment that each copy is made of.
-            seed: of the chance from here on.
-        """
-        ...
 
 
 class ModelEnvironments:

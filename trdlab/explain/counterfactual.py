@@ -6,12 +6,11 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.environments import Environments
+from trdlab.environments import CopyableEnvironments, Environments
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.explain.branches import Branches, Branching
-from trdlab.explain.copies import CopyableEnvironments
 from trdlab.explain.episodes import Policy, decide
 from trdlab.explain.trust.intervals import LEVEL, RESAMPLES, Estimates, draws, percentiles
 

@@ -160,6 +160,7 @@ def forms_of(
         "episodes": _counted("episode"),
         "value": Form(number, _NUMBER, _read_value),
         "amount": Form(amount, _NUMBER, _read_amount),
+        "skill": Form(lambda x, _: number(x), _NUMBER, lambda text: Shown(text, number)),
         "estimate": Form(_show_estimate, _ESTIMATE, _read_estimate),
         "plain": Form(lambda x, _: plain(x), _NUMBER, lambda text: Shown(text, plain)),
         "precise": Form(lambda x, _: _precise(x), _NUMBER, lambda text: Shown(text, _precise)),

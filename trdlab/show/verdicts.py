@@ -36,14 +36,14 @@ TEMPLATES: dict[type[Claim], str] = {
     ),
     verdicts.CannotBeKnown: (
         "What comes at {component:label} can hardly be known: even a perfect forecast would have "
-        "a skill of at most {at_most:value}."
+        "a skill of at most {at_most:skill}."
     ),
     verdicts.IsNotKnown: (
         "More could be known of {component:label}: a perfect forecast would have a skill of "
-        "{ceiling:value}, this one has {skill:value}."
+        "{ceiling:skill}, this one has {skill:skill}."
     ),
     verdicts.AsGoodAsCanBe: (
-        "At {component:label} its skill of {skill:value} cannot be told from that of a perfect "
+        "At {component:label} its skill of {skill:skill} cannot be told from that of a perfect "
         "forecast."
     ),
     verdicts.FoilsTrustedTo: (

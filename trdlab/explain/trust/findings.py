@@ -101,7 +101,7 @@ def _ceiling(report: TrustReport) -> Findings:
     skill = float(report.calibration.skill.value[at])
     limit = report.ceiling.skill[at]
     claims = (
-        CannotBeKnown(at, limit.high),
+        CannotBeKnown(at, max(limit.high, 0.0)),
         IsNotKnown(at, limit.value, skill),
         AsGoodAsCanBe(at, skill),
     )

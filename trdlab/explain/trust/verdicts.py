@@ -177,14 +177,14 @@ class NoChance(TrustFinding):
 
 @dataclass(eq=False, repr=False)
 class CannotBeKnown(TrustFinding):
-    """A perfect forecast of a component would surely have little skill."""
+    """A perfect forecast of a component would surely have little skill; never less than none."""
 
     component: int
     at_most: float
 
     def holds(self, report: TrustReport) -> bool:
         limit, _ = _limit_and_skill(report, self.component)
-        return limit.high < LITTLE and agrees(self.at_most, limit.high)
+        return limit.high < LITTLE and agrees(self.at_most, max(limit.high, 0.0))
 
 
 @dataclass(eq=False, repr=False)

@@ -8,7 +8,7 @@ import pytest
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import contrast, flips, forecast
+from trdlab.explain import chances, contrast, flips, forecast, rhythm
 from trdlab.explain.explanation import (
     Explanation,
     TiedActions,
@@ -182,7 +182,9 @@ def test_costs_are_not_called_rewards():
     explanation = explain(moment([[-1.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]), "a", "b")
     assert found(contrast.LessCostly, explanation)
     assert not found(contrast.MoreImmediate, explanation)
-    assert not found(forecast.Peak, explanation)
+    (first,) = found(forecast.FirstStepReward, explanation)
+    assert (first.effect, first.component, first.reward) == ("cost", 0, -1.0)
+    assert not found(rhythm.Peak, explanation)
 
 
 def test_a_learned_table_is_explained_like_an_exact_one():
@@ -200,14 +202,14 @@ def test_a_learned_table_is_explained_like_an_exact_one():
 def test_uncertainty_is_told_where_there_is_any():
     world = Gridworld(parse_map("T = treasure 4 terminal\nslip: 0.5\n---\n...\nS.T\n..."))
     explanation = explained(world, TimeAxis(0.9, 6), action="right", foil="up")
-    (either,) = found(forecast.EitherOr, explanation)
+    (either,) = found(chances.EitherOr, explanation)
     # two moves to the right in a row succeed with 1/4: then 4 is paid at t+1
     assert (either.component, either.reward, either.chance) == (1, 4.0, pytest.approx(0.25))
-    (give,) = found(forecast.GiveOrTake, explanation)
+    (give,) = found(chances.GiveOrTake, explanation)
     assert 0 < give.deviation < 2
-    assert not found(forecast.GiveOrTake, explained())  # nothing slips on the drone's map
-    over = found(forecast.SurelyOver, explained(axis=TimeAxis(GAMMA, 6)))
-    assert over == [forecast.SurelyOver("down", 5)]
+    assert not found(chances.GiveOrTake, explained())  # nothing slips on the drone's map
+    over = found(chances.SurelyOver, explained(axis=TimeAxis(GAMMA, 6)))
+    assert over == [chances.SurelyOver("down", 5)]
 
 
 @pytest.mark.parametrize(

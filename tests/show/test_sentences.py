@@ -1,6 +1,7 @@
 """No sentence without its numbers: what is printed is read back and tested."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from trdlab.show.sentences import TEMPLATES, UnsupportedSentenceError, check, se
 from trdlab.tabular import exact
 
 NAMES = ("up", "down", "FIRE", "move left")
-SYMMETRIC = ("have the same components", "are both worth", "tie: their values")
+SYMMETRIC = ("have the same components", "are both worth", "tie: their values", "of what tells")
 WORDS = {
     "more": "fewer",
     "never": "always",
@@ -39,13 +40,24 @@ WORDS = {
     "not": "too",
     "likely": "hardly",
     "either": "neither",
+    "first reward": "first notable reward",
+    "notable reward": "reward",
+    "notable cost": "notable reward",
+    "reward expected": "cost expected",
+    "peaks": "dips",
+    "before": "after",
+    "Before": "After",
+    "about every": "exactly every",
+    "uncertain": "certain",
+    "off by": "right to",
+    "have not proved": "have proved",
 }
 
 
 @st.composite
 def moments(draw: st.DrawFn) -> Moment:
     """Random moments: repeated, zero and negative components, missing totals, ties, what-ifs."""
-    horizon = draw(st.integers(0, 5))
+    horizon = draw(st.sampled_from([0, 1, 2, 3, 4, 5, 5, 9]))
     actions = draw(st.integers(2, 4))
     gamma = draw(st.sampled_from([0.0, 0.3, 0.95, 0.999]))
     axis = TimeAxis(gamma, horizon, draw(st.sampled_from([1, 1, 2, 5])))
@@ -66,6 +78,8 @@ def moments(draw: st.DrawFn) -> Moment:
 
     components = draw(st.integers(0, horizon))
     trust = Trust(axis, components, horizon, draw(st.integers(0, components)), draw(st.booleans()))
+    off_by = [0.01, 0.2, 0.3, 0.5, 0.7, 2.0, 4.0, 9.0, np.nan, np.nan]
+    errors = draw(st.permutations(off_by))[: horizon + 1]
     return Moment(
         decomposition,
         NAMES[:actions],
@@ -75,6 +89,8 @@ def moments(draw: st.DrawFn) -> Moment:
         tied_later=draw(st.integers(0, 2)),
         what_ifs=(WhatIf("γ", 0.95, 0.01, 0.99, q_values),),
         trust=draw(st.sampled_from([None, trust])),
+        error=draw(st.sampled_from([None, size * np.array(errors)])),
+        only_reward=draw(st.sampled_from([None, 4.0 * size, -4.0 * size])),
     )
 
 
@@ -91,8 +107,36 @@ def of_maps() -> list[Explanation]:
     return result
 
 
-def test_every_sentence_about_every_map_is_supported(of_maps: list[Explanation]):
-    for explanation in of_maps:
+@pytest.fixture(scope="module")
+def of_learned() -> list[Explanation]:
+    """Forecasts as networks make them: bumps, noise, a slope, some of it not to be trusted."""
+    steps, rng, result = np.arange(41), np.random.default_rng(0), []
+    for places in ((8,), (3, 11, 19, 27), (4, 9, 22), (2, 6, 13, 17, 30)):
+        for size, slope in ((1.0, 0.0), (-2.0, 0.0), (0.5, 0.3)):
+            axis = TimeAxis(0.95, 40)
+            bumps = sum(np.exp(-((steps - place) ** 2) / 4.0) for place in places)
+            row = size * bumps + slope * (1.0 - steps / 40) + rng.normal(0.0, 0.02, 41)
+            rows = np.stack([row, np.roll(row, 2)]) * axis.discounts
+            trust = Trust(axis, 36, 40, 36, residual=False)
+            told = Moment(
+                RewardDecomposition(rows, axis),
+                NAMES[:2],
+                Future("the greedy policy"),
+                trust=trust,
+                error=rng.uniform(0.2, 0.5, 41) * axis.discounts,
+                only_reward=2.2 * size,
+                seconds_per_step=0.1,
+            )
+            result.append(explain(told, *NAMES[:2]))
+            near = replace(told, trust=Trust(axis, 1, 40, 1, residual=False))
+            result.append(explain(near, *NAMES[:2]))
+    return result
+
+
+def test_every_sentence_about_every_map_is_supported(
+    of_maps: list[Explanation], of_learned: list[Explanation]
+):
+    for explanation in of_maps + of_learned:
         claims = check(" ".join(sentences(explanation)), explanation)
         assert [type(c) for c in claims] == [type(x) for x in explanation.findings]
 
@@ -106,8 +150,10 @@ def test_every_sentence_about_any_moment_is_supported(moment: Moment):
     assert [type(c) for c in claims] == [type(x) for x in explanation.findings]
 
 
-def test_every_kind_of_finding_occurs_and_has_a_sentence(of_maps: list[Explanation]):
-    seen: set[type[Finding]] = {type(x) for e in of_maps for x in e.findings}
+def test_every_kind_of_finding_occurs_and_has_a_sentence(
+    of_maps: list[Explanation], of_learned: list[Explanation]
+):
+    seen: set[type[Finding]] = {type(x) for e in of_maps + of_learned for x in e.findings}
 
     @settings(max_examples=400, deadline=None, derandomize=True)
     @given(moments())
@@ -181,6 +227,13 @@ def survivors(explanation: Explanation) -> list[str]:
 def test_a_mutated_number_name_or_claim_about_a_map_fails(of_maps: list[Explanation]):
     assert sum(len(mutations(explanation)) for explanation in of_maps) > 2_000
     assert [mutant for explanation in of_maps for mutant in survivors(explanation)] == []
+
+
+def test_a_mutated_number_name_or_claim_about_a_learned_forecast_fails(
+    of_learned: list[Explanation],
+):
+    assert sum(len(mutations(explanation)) for explanation in of_learned) > 1_000
+    assert [mutant for explanation in of_learned for mutant in survivors(explanation)] == []
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)

@@ -7,14 +7,20 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.explain.finding import Finding, agrees
+from trdlab.explain.limits import doubtful
 from trdlab.explain.moment import Moment, same
+
+_MOST_DOUBT = 0.5  # of a difference, to tell what comes when
+_MOST_REASONS = 6  # components that people still look at
+_MOST_CROSSINGS = 2  # of more only the last is told
 
 
 def contrast(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     """Returns how an action's future differs from its foil's.
 
     In order: the undiscounted totals, which pays sooner, which is worth more, where the running
-    totals cross, and the fewest components that justify the better one.
+    totals cross, and the few components that justify the better one. Where more than half of the
+    difference is not to be trusted, that is said instead of what comes when.
 
     Args:
         moment: the decompositions of every action.
@@ -28,6 +34,9 @@ def contrast(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     worth = _worth(moment, action, foil)
     if not difference(moment, action, foil).any():
         return (*_totals(moment, action, foil), SameComponents(action, foil), worth)
+    doubt = DoubtfulDifference(action, foil, doubtful_share(moment, action, foil))
+    if doubt.holds(moment):
+        return (*_totals(moment, action, foil), worth, doubt)
     return (
         *_totals(moment, action, foil),
         *_sooner(moment, action, foil),
@@ -86,7 +95,8 @@ def _crossings(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
             sums = [float(moment.components(name)[: i + 1].sum()) for name in (leader, other)]
             found.append(Overtakes(leader, other, int(i), sums[0], sums[1]))
     never = [StaysAhead(action, foil), StaysAhead(foil, action)]
-    return tuple(found) or tuple(finding for finding in never if finding.holds(moment))
+    told = found if len(found) <= _MOST_CROSSINGS else found[-1:]
+    return tuple(told) or tuple(finding for finding in never if finding.holds(moment))
 
 
 def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
@@ -105,6 +115,8 @@ def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
         advantage = float(delta[chosen].sum())
         if advantage > against:
             break
+    if len(chosen) > _MOST_REASONS:
+        return ()
     return (Reasons(better, worse, tuple(sorted(chosen)), advantage, against),)
 
 
@@ -156,6 +168,19 @@ class SameComponents(Finding):
 
     def holds(self, moment: Moment) -> bool:
         return not difference(moment, self.action, self.foil).any()
+
+
+@dataclass(eq=False, repr=False)
+class DoubtfulDifference(Finding):
+    """More than half of the difference, Σ|action − foil|, lies in components not to be trusted."""
+
+    action: str
+    foil: str
+    share: float
+
+    def holds(self, moment: Moment) -> bool:
+        share = doubtful_share(moment, self.action, self.foil)
+        return share > _MOST_DOUBT and agrees(self.share, share)
 
 
 @dataclass(eq=False, repr=False)
@@ -326,6 +351,12 @@ def difference(moment: Moment, action: str, foil: str) -> FloatArray:
     a, b = moment.components(action), moment.components(foil)
     equal = np.abs(a - b) <= 1e-12 * np.maximum(np.abs(a), np.abs(b))
     return np.where(equal, 0.0, a - b)
+
+
+def doubtful_share(moment: Moment, action: str, foil: str) -> float:
+    """Returns the share of Σ|action − foil| in components not to be trusted; 0 of no difference."""
+    size = np.abs(difference(moment, action, foil))
+    return float(size[doubtful(moment)].sum() / size.sum()) if size.any() else 0.0
 
 
 def running_lead(moment: Moment, action: str, foil: str) -> FloatArray:

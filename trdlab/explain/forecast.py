@@ -1,19 +1,28 @@
 """Forecast: what one action is expected to pay, and when."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
+from trdlab.explain.chances import chances, likelihood
 from trdlab.explain.finding import Finding, agrees, one_sign
+from trdlab.explain.limits import doubtful, explicit_end
 from trdlab.explain.moment import Moment
+from trdlab.explain.rhythm import effect_of, largest, regular, stands_out, undiscounted
+
+_MATTERS = 0.5
+"""An error is told that is at least this share of what is expected."""
+
+_TOO_LITTLE = 0.005  # of an action's value, to tell that it lies beyond
 
 
 def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
-    """Returns when an action's first reward comes, its peak, its centre and what lies beyond N.
+    """Returns when an action's first reward comes, its peaks, its centre and what lies beyond N.
 
-    Shares and centres are defined only where all components have one sign, and the centre only
-    for w = 1; where they are not defined there is no finding.
+    Nothing is said of components that are not to be trusted. Shares and centres are defined only
+    where all components have one sign, and the centre only for w = 1; where they are not defined
+    there is no finding.
 
     Args:
         moment: the decompositions of every action.
@@ -22,78 +31,85 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
     Raises:
         InputError: there is no such action.
     """
-    return _when(moment, action) + _chances(moment, action)
-
-
-def _when(moment: Moment, action: str) -> tuple[Finding, ...]:
-    axis, row = moment.time_axis, moment.components(action)
-    explicit, value = row[:-1], float(row.sum())
-    if not row.any():
-        return (EarnsNothing(action),)
-    if axis.horizon == 0:
+    row, end = moment.components(action), explicit_end(moment)
+    if doubtful(moment).all():
         return ()
-    if not explicit.any():
-        return (AllBeyond(action, value, axis.horizon),)
-    first = int(np.flatnonzero(explicit)[0])
-    discounted = float(explicit[first])
-    findings: list[Finding] = []
-    if axis.width == 1 and axis.gamma > 0.0:
-        reward = discounted / axis.gamma**first
-        kind = FirstStepReward if discounted > 0.0 else FirstStepCost
-        findings.append(kind(action, first, discounted, reward))
-    else:
-        findings.append((FirstReward if discounted > 0.0 else FirstCost)(action, first, discounted))
-    if np.count_nonzero(explicit) > 1:
-        peak = int(explicit.argmax())
-        if explicit[peak] > 0.0:
-            findings.append(Peak(action, peak, float(explicit[peak])))
-        if axis.width == 1 and one_sign(explicit):
-            centre = explicit @ np.arange(axis.horizon) / explicit.sum()
-            findings.append(CentreOfMass(action, float(centre)))
-    if one_sign(row) and row[-1] != 0.0:
-        findings.append(ShareBeyond(action, float(row[-1] / value), axis.horizon))
-    return tuple(findings)
+    if not row[:end].any():
+        return (*_nothing(moment, action), *chances(moment, action))
+    firsts = tuple(_firsts(moment, action))
+    named = {first.component for first in firsts}
+    return (
+        *firsts,
+        *likelihood(moment, action),
+        *regular(moment, action, named),
+        *_accuracy(moment, action),
+        *_whole(moment, action),
+        *chances(moment, action),
+    )
 
 
-def _chances(moment: Moment, action: str) -> tuple[Finding, ...]:
-    """Returns what is uncertain about an action: all of it, one step, and how long it lasts."""
-    known, a = moment.uncertainty, moment.index(action)
-    if known is None:
-        return ()
-    findings: list[Finding] = []
-    deviation = float(known.return_deviation[a])
-    if deviation > 0.0:
-        findings.append(GiveOrTake(action, moment.q_value(action), deviation))
-    either = [
-        EitherOr(action, i, reward, chance)
-        for i, step in enumerate(known.outcomes[a] if known.outcomes else ())
-        for reward, chance in step.items()
-        if set(step) == {0.0, reward} and reward != 0.0
-    ]
-    if either:
-        findings.append(max(either, key=lambda x: abs(x.reward) * x.chance))
-    over = np.flatnonzero(known.survival[a] < 0.5)
-    if over.size:
-        i = int(over[0])
-        chance = 1.0 - float(known.survival[a, i])
-        sure = SurelyOver(action, i)
-        findings.append(sure if sure.holds(moment) else LikelyOver(action, i, chance))
-    return tuple(findings)
+def _nothing(moment: Moment, action: str) -> tuple[Finding, ...]:
+    """Returns what is said where no explicit component differs from zero."""
+    beyond = AllBeyond(action, moment.q_value(action), moment.time_axis.horizon)
+    before = NothingBefore(action, explicit_end(moment))
+    claims = (EarnsNothing(action), beyond, before)
+    return tuple(claim for claim in claims if claim.holds(moment))[:1]
+
+
+def _firsts(moment: Moment, action: str) -> Iterator["FirstReward"]:
+    """Yields the first reward and the first cost, the earlier one first."""
+    row, notable = undiscounted(moment, action), stands_out(moment, action)
+    places = [np.flatnonzero(notable & (sign * row > 0.0)) for sign in (1.0, -1.0)]
+    for i in sorted(int(place[0]) for place in places if place.size):
+        discounted = float(moment.components(action)[i])
+        effect = _effect(moment, action, i)
+        if moment.time_axis.width == 1:
+            yield FirstStepReward(action, effect, i, discounted, float(row[i]))
+        else:
+            yield FirstReward(action, effect, i, discounted)
+
+
+def _effect(moment: Moment, action: str, component: int) -> str:
+    """Returns what a component is called: a notable one, if smaller ones of its kind precede it."""
+    row = undiscounted(moment, action)
+    is_preceded = bool((row[:component] * np.sign(row[component]) > 0.0).any())
+    return "notable " * is_preceded + effect_of(row[component])
+
+
+def _accuracy(moment: Moment, action: str) -> Iterator[Finding]:
+    """Yields what such forecasts are off by, where that matters."""
+    i = largest(moment, action)
+    if moment.error is not None and not moment.is_exact:
+        error = float(moment.error[i])
+        if error >= _MATTERS * abs(moment.components(action)[i]):  # not so if it is NaN
+            yield OffBy(action, i, error)
+
+
+def _whole(moment: Moment, action: str) -> Iterator[Finding]:
+    """Yields what is said of all components together."""
+    row, end = moment.components(action), explicit_end(moment)
+    explicit = row[:end]
+    if one_sign(explicit) and np.count_nonzero(explicit) > 1 and moment.time_axis.width == 1:
+        yield CentreOfMass(action, end, float(explicit @ np.arange(end) / explicit.sum()))
+    if one_sign(row):
+        beyond = ShareBeyond(action, float(row[-1] / row.sum()), moment.time_axis.horizon)
+        if beyond.share >= _TOO_LITTLE and beyond.holds(moment):
+            yield beyond
 
 
 @dataclass(eq=False, repr=False)
 class EarnsNothing(Finding):
-    """No component of an action differs from zero."""
+    """No component of an action differs from zero, and all are trusted."""
 
     action: str
 
     def holds(self, moment: Moment) -> bool:
-        return not moment.components(self.action).any()
+        return not moment.components(self.action).any() and not doubtful(moment).any()
 
 
 @dataclass(eq=False, repr=False)
 class AllBeyond(Finding):
-    """All of an action's value lies in the residual."""
+    """All of an action's value lies in the residual, and every component is trusted."""
 
     action: str
     value: float
@@ -101,31 +117,42 @@ class AllBeyond(Finding):
 
     def holds(self, moment: Moment) -> bool:
         row = moment.components(self.action)
-        at_end = self.component == moment.time_axis.horizon > 0
+        at_end = self.component == moment.time_axis.horizon > 0 and not doubtful(moment).any()
         return at_end and not row[:-1].any() and row[-1] != 0.0 and agrees(self.value, row[-1])
 
 
 @dataclass(eq=False, repr=False)
-class FirstReward(Finding):
-    """The first component of an action that is not zero, where it is positive."""
-
-    sign: ClassVar[float] = 1.0
+class NothingBefore(Finding):
+    """No component of an action differs from zero, of those that a forecast speaks of."""
 
     action: str
+    end: int
+
+    def holds(self, moment: Moment) -> bool:
+        is_nothing = not moment.components(self.action)[: self.end].any()
+        return is_nothing and self.end == explicit_end(moment) > 0
+
+
+@dataclass(eq=False, repr=False)
+class FirstReward(Finding):
+    """The first component of its sign that stands out; it is notable if smaller ones precede it."""
+
+    action: str
+    effect: str
     component: int
     discounted: float
 
     def holds(self, moment: Moment) -> bool:
-        row, i = moment.components(self.action), self.component
-        is_first = i < moment.time_axis.horizon and not row[:i].any()
-        return is_first and bool(row[i] * self.sign > 0.0) and agrees(self.discounted, row[i])
-
-
-@dataclass(eq=False, repr=False)
-class FirstCost(FirstReward):
-    """The same where that component is negative."""
-
-    sign: ClassVar[float] = -1.0
+        row, notable = undiscounted(moment, self.action), stands_out(moment, self.action)
+        i = self.component
+        if i >= len(row) or not notable[i]:
+            return False
+        before = notable[:i] & (np.sign(row[:i]) == np.sign(row[i]))
+        return (
+            not before.any()
+            and self.effect == _effect(moment, self.action, i)
+            and agrees(self.discounted, float(moment.components(self.action)[i]))
+        )
 
 
 @dataclass(eq=False, repr=False)
@@ -135,43 +162,50 @@ class FirstStepReward(FirstReward):
     reward: float
 
     def holds(self, moment: Moment) -> bool:
-        axis = moment.time_axis
-        if axis.width != 1 or axis.gamma == 0.0 or not super().holds(moment):
-            return False
-        true = moment.components(self.action)[self.component] / axis.gamma**self.component
-        return agrees(self.reward, float(true))
-
-
-@dataclass(eq=False, repr=False)
-class FirstStepCost(FirstStepReward):
-    """The same where that reward is negative."""
-
-    sign: ClassVar[float] = -1.0
-
-
-@dataclass(eq=False, repr=False)
-class Peak(Finding):
-    """The largest explicit component (of equals the first), where several are not zero."""
-
-    action: str
-    component: int
-    discounted: float
-
-    def holds(self, moment: Moment) -> bool:
-        row, i = moment.components(self.action), self.component
-        explicit = row[:-1]
         return (
-            i < moment.time_axis.horizon
-            and bool(explicit[i] > 0.0 and (explicit[i] >= explicit).all())
-            and not (explicit[:i] == explicit[i]).any()
-            and int(np.count_nonzero(explicit)) > 1
-            and agrees(self.discounted, row[i])
+            moment.time_axis.width == 1
+            and super().holds(moment)
+            and agrees(self.reward, float(undiscounted(moment, self.action)[self.component]))
         )
 
 
 @dataclass(eq=False, repr=False)
+class OffBy(Finding):
+    """What forecasts of an action's largest component are off by: the root mean square."""
+
+    action: str
+    component: int
+    error: float
+
+    def holds(self, moment: Moment) -> bool:
+        if moment.error is None or not undiscounted(moment, self.action).any():
+            return False
+        i = largest(moment, self.action)
+        return self.component == i and agrees(self.error, float(moment.error[i]))
+
+
+@dataclass(eq=False, repr=False)
+class CentreOfMass(Finding):
+    """The mean step of an action's rewards before `end`, weighted by amount; w = 1, one sign."""
+
+    action: str
+    end: int
+    step: float
+
+    def holds(self, moment: Moment) -> bool:
+        explicit = moment.components(self.action)[: self.end]
+        is_defined = moment.time_axis.width == 1 and one_sign(explicit)
+        if self.end != explicit_end(moment) or not is_defined:
+            return False
+        return agrees(self.step, float(explicit @ np.arange(self.end) / explicit.sum()))
+
+
+@dataclass(eq=False, repr=False)
 class ShareBeyond(Finding):
-    """The share of an action's value that lies in the residual; components of one sign only."""
+    """The share of an action's value that lies in the residual.
+
+    All components have one sign, and all are trusted.
+    """
 
     action: str
     share: float
@@ -183,95 +217,6 @@ class ShareBeyond(Finding):
             self.component == moment.time_axis.horizon > 0
             and one_sign(row)
             and row[-1] != 0.0
+            and not doubtful(moment).any()
             and agrees(self.share, float(row[-1] / row.sum()))
         )
-
-
-@dataclass(eq=False, repr=False)
-class CentreOfMass(Finding):
-    """The mean step of an action's explicit rewards, weighted by amount; w = 1, one sign."""
-
-    action: str
-    step: float
-
-    def holds(self, moment: Moment) -> bool:
-        explicit = moment.components(self.action)[:-1]
-        if moment.time_axis.width != 1 or not one_sign(explicit):
-            return False
-        return agrees(self.step, float(explicit @ np.arange(len(explicit)) / explicit.sum()))
-
-
-@dataclass(eq=False, repr=False)
-class GiveOrTake(Finding):
-    """The standard deviation of an action's whole discounted reward."""
-
-    action: str
-    value: float
-    deviation: float
-
-    def holds(self, moment: Moment) -> bool:
-        if moment.uncertainty is None:
-            return False
-        deviation = float(moment.uncertainty.return_deviation[moment.index(self.action)])
-        value = moment.q_value(self.action)
-        return deviation > 0.0 and agrees(self.value, value) and agrees(self.deviation, deviation)
-
-
-@dataclass(eq=False, repr=False)
-class EitherOr(Finding):
-    """A step that pays one amount or nothing; of several, where most of it is expected."""
-
-    action: str
-    component: int
-    reward: float
-    chance: float
-
-    def holds(self, moment: Moment) -> bool:
-        known, a = moment.uncertainty, moment.index(self.action)
-        if known is None or not known.outcomes or self.component >= len(known.outcomes[a]):
-            return False
-        expected = [
-            sum(abs(r) * p for r, p in step.items()) if len(step) == 2 and 0.0 in step else -1.0
-            for step in known.outcomes[a]
-        ]
-        step = known.outcomes[a][self.component]
-        (reward, chance), *_ = [*((r, p) for r, p in step.items() if r != 0.0), (0.0, 0.0)]
-        return (
-            expected.index(max(expected)) == self.component
-            and expected[self.component] > 0.0
-            and agrees(self.reward, reward)
-            and agrees(self.chance, chance)
-        )
-
-
-@dataclass(eq=False, repr=False)
-class LikelyOver(Finding):
-    """The first component at whose beginning the episode has more likely ended than not."""
-
-    action: str
-    component: int
-    chance: float
-
-    def holds(self, moment: Moment) -> bool:
-        survival = _survival_when_likely_over(moment, self.action, self.component)
-        return survival is not None and survival > 0.0 and agrees(self.chance, 1.0 - survival)
-
-
-@dataclass(eq=False, repr=False)
-class SurelyOver(Finding):
-    """The same where it has ended for certain."""
-
-    action: str
-    component: int
-
-    def holds(self, moment: Moment) -> bool:
-        return _survival_when_likely_over(moment, self.action, self.component) == 0.0
-
-
-def _survival_when_likely_over(moment: Moment, action: str, component: int) -> float | None:
-    """Returns the survival at a component, if it is the first at which it is below one half."""
-    if moment.uncertainty is None:
-        return None
-    survival = moment.uncertainty.survival[moment.index(action)]
-    below = np.flatnonzero(survival < 0.5)
-    return float(survival[component]) if below.size and below[0] == component else None

@@ -1,17 +1,59 @@
 """Limits: what of a moment's forecasts lies beyond the range that can be trusted."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trdlab.arrays import BoolArray
 from trdlab.explain.finding import Finding
 from trdlab.explain.moment import Moment
+
+if TYPE_CHECKING:
+    from trdlab.explain.trust.report import TrustReport
+
+_LEAST_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25  # what is smaller cannot be taken out
+
+
+def judged(moment: Moment, report: "TrustReport") -> Moment:
+    """Returns a moment with what a report knows of such forecasts.
+
+    That is how far they can be trusted, what they are off by, and whether rewards are of one kind.
+
+    Args:
+        moment: what is expected.
+        report: on the estimator that expects it.
+    """
+    calibration = report.calibration
+    error, reliability = calibration.error, calibration.reliability
+    return replace(
+        moment,
+        trust=report.trust,
+        error=np.where(np.isfinite(error.low), np.sqrt(error.value), np.nan),
+        only_reward=None if reliability is None else reliability.amount,
+    )
+
+
+def doubtful(moment: Moment) -> BoolArray:
+    """Returns `[N+1]`: what is not to be trusted; nothing of it where that has not been judged."""
+    if moment.trust is None:
+        return np.zeros(moment.time_axis.num_components, dtype=np.bool_)
+    return moment.trust.doubtful
+
+
+def explicit_end(moment: Moment) -> int:
+    """Returns the first component that a forecast is silent of: the residual, or one before it.
+
+    It is one that is not to be trusted, or so far away that its discount cannot be taken out.
+    """
+    silent = doubtful(moment) | (moment.time_axis.discounts < _LEAST_DISCOUNT)
+    silent[-1] = True
+    return int(silent.argmax())
 
 
 def limits(moment: Moment) -> tuple[Finding, ...]:
     """Returns what is not to be trusted of a moment; nothing where that has not been judged."""
-    doubtful = np.flatnonzero(_doubtful(moment))
-    first = int(doubtful[0]) if doubtful.size else 0
+    first = int(doubtful(moment).argmax())
     residual = moment.time_axis.horizon
     claims = (
         TrustedWhole(),
@@ -28,7 +70,7 @@ class TrustedWhole(Finding):
     """Every component is trusted, the residual too."""
 
     def holds(self, moment: Moment) -> bool:
-        return moment.trust is not None and not any(_doubtful(moment))
+        return moment.trust is not None and not doubtful(moment).any()
 
 
 @dataclass(eq=False, repr=False)
@@ -36,7 +78,7 @@ class NowhereTrusted(Finding):
     """No component is trusted, nor is the residual."""
 
     def holds(self, moment: Moment) -> bool:
-        return moment.trust is not None and all(_doubtful(moment))
+        return moment.trust is not None and bool(doubtful(moment).all())
 
 
 @dataclass(eq=False, repr=False)
@@ -46,7 +88,7 @@ class NotTrustedAt(Finding):
     component: int
 
     def holds(self, moment: Moment) -> bool:
-        *explicit, residual = _doubtful(moment) or [False]
+        *explicit, residual = doubtful(moment).tolist()
         return residual and not any(explicit) and self.component == len(explicit) > 0
 
 
@@ -57,7 +99,7 @@ class NotTrustedFrom(Finding):
     component: int
 
     def holds(self, moment: Moment) -> bool:
-        *explicit, residual = _doubtful(moment) or [False]
+        *explicit, residual = doubtful(moment).tolist()
         return residual and any(explicit) and explicit.index(True) == self.component > 0
 
 
@@ -69,11 +111,6 @@ class NotTrustedBetween(Finding):
     residual: int
 
     def holds(self, moment: Moment) -> bool:
-        *explicit, residual = _doubtful(moment) or [False]
+        *explicit, residual = doubtful(moment).tolist()
         begins = any(explicit) and explicit.index(True) == self.component
         return begins and not residual and self.residual == len(explicit)
-
-
-def _doubtful(moment: Moment) -> list[bool]:
-    """Returns whether each component is not to be trusted; nothing where that was not judged."""
-    return [] if moment.trust is None else moment.trust.doubtful.tolist()

@@ -80,6 +80,10 @@ class Moment:
         uncertainty: spread and survival, where they are known.
         trust: how far such forecasts can be trusted, if that has been judged.
         seconds_per_step: how long a step takes as people play, if that is known.
+        error: `[N+1]`, what such forecasts are off by, in discounted reward: the root mean square
+            of predicted − observed, NaN where it is not known; None if it has not been judged.
+        only_reward: the one reward that was ever observed besides 0; None where there were several,
+            and where that is not known.
     """
 
     decomposition: RewardDecomposition
@@ -94,6 +98,8 @@ class Moment:
     uncertainty: Uncertainty | None = None
     trust: "Trust | None" = None
     seconds_per_step: float | None = None
+    error: FloatArray | None = None
+    only_reward: float | None = None
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):
@@ -107,6 +113,11 @@ class Moment:
     def time_axis(self) -> TimeAxis:
         """What the components mean."""
         return self.decomposition.time_axis
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether a solved model is spoken of: what is expected then carries no noise."""
+        return self.totals is not None
 
     def index(self, action: str) -> int:
         """Returns the number of an action.

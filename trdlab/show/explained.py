@@ -1,7 +1,7 @@
 """An agent explained: what it expects at a moment, how far to trust that; as text or plain data."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
 from rich.console import Group, RenderableType
@@ -13,6 +13,7 @@ from trdlab.explain.agents import Agent
 from trdlab.explain.assessment import Copying, assess, try_out
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Claim, Finding
+from trdlab.explain.limits import judged
 from trdlab.explain.tried import Trial, trial_findings
 from trdlab.explain.trust.findings import trust_findings
 from trdlab.explain.trust.report import TrustReport
@@ -47,6 +48,7 @@ _MATTERS_MOST = (
     "better",
     "better-by-discount",
     "same-components",
+    "doubtful-difference",
     "dominates",
     "more-immediate",
     "less-costly",
@@ -146,8 +148,7 @@ def explain_agent(
     )
     explanation = None
     if moment is not None and pair is not None:
-        trusted = replace(moment, trust=None if report is None else report.trust)
-        explanation = explain(trusted, *pair)
+        explanation = explain(moment if report is None else judged(moment, report), *pair)
     trial = None
     if pair is not None and pair[1] is not None and "contrast" in wanted:
         trial = try_out(agent, pair[0], pair[1], seed=seed, step=step)

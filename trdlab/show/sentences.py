@@ -22,6 +22,10 @@ TEMPLATES: dict[type[Claim], str] = {
         "{leader_sum:value} against {other_sum:value}."
     ),
     contrast.SameComponents: "{action} and {foil} have the same components.",
+    contrast.DoubtfulDifference: (
+        "{share:percent} of what tells {action} and {foil} apart lies at steps where such "
+        "forecasts have not proved better than a guess."
+    ),
     contrast.BetterByDiscount: (
         "Only the discount tells them apart: with γ = {gamma:plain} {better} is worth "
         "{better_value:value} and {worse} {worse_value:value}."
@@ -130,10 +134,13 @@ TEMPLATES: dict[type[Claim], str] = {
     ),
 }
 
+_EFFECT = Form(lambda effect, _: str(effect), r"(?:notable )?(?:reward|cost)", str)
+
 MOMENTS = Language[Explanation](
     TEMPLATES,
-    lambda told: forms_of(
-        told.moment.time_axis, told.moment.action_names, told.moment.seconds_per_step
+    lambda told: (
+        {"effect": _EFFECT}
+        | forms_of(told.moment.time_axis, told.moment.action_names, told.moment.seconds_per_step)
     ),
     evidence=lambda told: told.moment,
     given=lambda told: {"action": told.action, "foil": told.foil},

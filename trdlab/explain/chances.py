@@ -1,0 +1,157 @@
+"""Chances: what is uncertain about what an action is expected to pay."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from trdlab.explain.finding import Finding, agrees
+from trdlab.explain.limits import explicit_end
+from trdlab.explain.moment import Moment
+from trdlab.explain.rhythm import largest, undiscounted
+
+
+def likelihood(moment: Moment, action: str) -> Iterator[Finding]:
+    """Yields the chance that a learned forecast implies, where it is one.
+
+    Args:
+        moment: the decompositions of every action.
+        action: the name of one of which something is expected.
+    """
+    if moment.only_reward is not None and not moment.is_exact:
+        i = largest(moment, action)
+        chance = float(undiscounted(moment, action)[i] / moment.only_reward)
+        claim = PutAt(action, i, moment.only_reward, chance)
+        if claim.holds(moment):
+            yield claim
+
+
+def chances(moment: Moment, action: str) -> Iterator[Finding]:
+    """Yields how much an action's reward varies, where one step does, and how long it lasts.
+
+    Args:
+        moment: the decompositions of every action, and how uncertain they are.
+        action: the name of one.
+    """
+    known, a = moment.uncertainty, moment.index(action)
+    if known is None:
+        return
+    deviation = float(known.return_deviation[a])
+    if deviation > 0.0:
+        yield GiveOrTake(action, moment.q_value(action), deviation)
+    steps = known.outcomes[a][: explicit_end(moment)] if known.outcomes else ()
+    either = [
+        EitherOr(action, i, reward, chance)
+        for i, step in enumerate(steps)
+        for reward, chance in step.items()
+        if set(step) == {0.0, reward} and reward != 0.0
+    ]
+    if either:
+        yield max(either, key=lambda x: abs(x.reward) * x.chance)
+    over = np.flatnonzero(known.survival[a] < 0.5)
+    if over.size:
+        i = int(over[0])
+        chance = 1.0 - float(known.survival[a, i])
+        sure = SurelyOver(action, i)
+        yield sure if sure.holds(moment) else LikelyOver(action, i, chance)
+
+
+@dataclass(eq=False, repr=False)
+class PutAt(Finding):
+    """The chance that the largest component implies, where one reward or none is ever observed.
+
+    With w = 1 component k is γ^k·c times the probability that step k pays c (errata P9, P10).
+    """
+
+    action: str
+    component: int
+    reward: float
+    chance: float
+
+    def holds(self, moment: Moment) -> bool:
+        row, paid = undiscounted(moment, self.action), moment.only_reward
+        if paid is None or moment.trust is None or moment.time_axis.width != 1 or not row.any():
+            return False
+        chance = float(row[largest(moment, self.action)] / paid)
+        return (
+            self.component == largest(moment, self.action)
+            and 0.0 < chance <= 1.0
+            and agrees(self.reward, paid)
+            and agrees(self.chance, chance)
+        )
+
+
+@dataclass(eq=False, repr=False)
+class GiveOrTake(Finding):
+    """The standard deviation of an action's whole discounted reward."""
+
+    action: str
+    value: float
+    deviation: float
+
+    def holds(self, moment: Moment) -> bool:
+        if moment.uncertainty is None:
+            return False
+        deviation = float(moment.uncertainty.return_deviation[moment.index(self.action)])
+        value = moment.q_value(self.action)
+        return deviation > 0.0 and agrees(self.value, value) and agrees(self.deviation, deviation)
+
+
+@dataclass(eq=False, repr=False)
+class EitherOr(Finding):
+    """A step that pays one amount or nothing; of several, where most of it is expected."""
+
+    action: str
+    component: int
+    reward: float
+    chance: float
+
+    def holds(self, moment: Moment) -> bool:
+        known, a, end = moment.uncertainty, moment.index(self.action), explicit_end(moment)
+        if known is None or not known.outcomes or self.component >= end:
+            return False
+        expected = [
+            sum(abs(r) * p for r, p in step.items()) if len(step) == 2 and 0.0 in step else -1.0
+            for step in known.outcomes[a][:end]
+        ]
+        step = known.outcomes[a][self.component]
+        (reward, chance), *_ = [*((r, p) for r, p in step.items() if r != 0.0), (0.0, 0.0)]
+        return (
+            expected.index(max(expected)) == self.component
+            and expected[self.component] > 0.0
+            and agrees(self.reward, reward)
+            and agrees(self.chance, chance)
+        )
+
+
+@dataclass(eq=False, repr=False)
+class LikelyOver(Finding):
+    """The first component at whose beginning the episode has more likely ended than not."""
+
+    action: str
+    component: int
+    chance: float
+
+    def holds(self, moment: Moment) -> bool:
+        survival = _survival_when_likely_over(moment, self.action, self.component)
+        return survival is not None and survival > 0.0 and agrees(self.chance, 1.0 - survival)
+
+
+@dataclass(eq=False, repr=False)
+class SurelyOver(Finding):
+    """The same where it has ended for certain."""
+
+    action: str
+    component: int
+
+    def holds(self, moment: Moment) -> bool:
+        return _survival_when_likely_over(moment, self.action, self.component) == 0.0
+
+
+def _survival_when_likely_over(moment: Moment, action: str, component: int) -> float | None:
+    """Returns the survival at a component, if it is the first at which it is below one half."""
+    if moment.uncertainty is None:
+        return None
+    survival = moment.uncertainty.survival[moment.index(action)]
+    below = np.flatnonzero(survival < 0.5)
+    return float(survival[component]) if below.size and below[0] == component else None

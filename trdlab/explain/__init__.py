@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
     from trdlab.explain.counterfactual import Counterfactual, play_to
     from trdlab.explain.episodes import Counting, Episode, collect
+    from trdlab.explain.revision import Played, Revision, revise
+    from trdlab.explain.story import Story, tell
     from trdlab.explain.trust.calibration import Calibration, calibrate
     from trdlab.explain.trust.ceiling import Ceiling
     from trdlab.explain.trust.findings import trust_findings
@@ -40,6 +42,9 @@ __all__ = [
     "Finding",
     "ModelEnvironments",
     "Moment",
+    "Played",
+    "Revision",
+    "Story",
     "Trust",
     "TrustReport",
     "Uncertainty",
@@ -55,8 +60,10 @@ __all__ = [
     "judge",
     "moment_of",
     "play_to",
+    "revise",
     "run_agent",
     "tabular_moment",
+    "tell",
     "trust_findings",
 ]
 
@@ -79,6 +86,11 @@ _HOMES = {
     "Counting": "episodes",
     "Episode": "episodes",
     "collect": "episodes",
+    "Played": "revision",
+    "Revision": "revision",
+    "revise": "revision",
+    "Story": "story",
+    "tell": "story",
     "trust_findings": "trust.findings",
     "TrustReport": "trust.report",
     "judge": "trust.report",

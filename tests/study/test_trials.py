@@ -40,10 +40,9 @@ def test_each_agent_comes_up_as_often_and_each_state_once(count: int):
 def test_a_seed_gives_the_same_trials_and_another_one_others():
     assert draw_trials(1) == draw_trials(1)
     assert draw_trials(1) != draw_trials(2)
-    orders = {"".join(trial.letter for trial in draw_trials(seed, 6)) for seed in range(8)}
-    assert len(orders) > 4  # they are shuffled, and so are the names of the actions
-    names = {trial.action for seed in range(3) for trial in draw_trials(seed)}
-    assert len(names) > 2
+    drawn = [draw_trials(seed, 6) for seed in range(4)]
+    assert len({"".join(trial.letter for trial in trials) for trials in drawn}) > 2
+    assert len({trial.action for trials in drawn for trial in trials}) > 2
 
 
 @pytest.mark.parametrize("count", [0, 4, 33, -3])
@@ -63,7 +62,7 @@ def test_the_three_agents_behave_as_they_are_described():
         ]
         return passed.count(symbol) / 30
 
-    assert visits("A", "c") > 2.5 > 0.5 > visits("B", "c")
+    assert visits("A", "c") > 3.5 > 0.5 > visits("B", "c")
     lengths = {x: np.mean([len(visited(x, seed)) for seed in range(30)]) for x in LETTERS}
     assert lengths["B"] < lengths["C"] < lengths["A"]  # the short way, round hazards, for coins
     assert visits("C", "h") < visits("B", "h")
@@ -88,7 +87,7 @@ def test_one_source_alone_is_worth_what_it_is_said_to_add():
 
 def test_a_single_loss_costs_more_than_there_is_to_earn():
     last = CANDIDATES[-1].rewards
-    assert -last["hazard"] > 3 * last["coin"] + last["treasure"]
+    assert -last["hazard"] > 4 * last["coin"] + last["treasure"]
 
 
 def test_there_is_no_fourth_agent():

@@ -21,7 +21,7 @@ from trdlab.tabular import MDP, WindowBuilder, exact, learn
 TUTORIALS = Path(__file__).parents[1] / "tutorials"
 LESSONS = sorted(TUTORIALS.glob("[0-9]*.py"))
 TRAINING = LESSONS[4:]
-"""Lessons that train a network for minutes: run once, not once for each question."""
+"""Lessons that train for long: run once, not once for each question."""
 
 # What a reader who understood would write. Found by solving, not taken from the exercises.
 SOLUTIONS = {
@@ -40,6 +40,9 @@ SOLUTIONS = {
     "5.1": "6 * (40 + 1)",
     "5.2": "10 * 250 * 4",
     "5.3": "sum((a - b) ** 2 for a, b in zip([4, 0.5, 2.5], [4, 1, 1]))",
+    "6.1": "next(k for k in range(9) if abs(0.9**k - 0.81) < 1e-9)",
+    "6.2": "[4, 0.5 * 1, 0.5 * (2 + 6)]",
+    "6.3": "1",
 }
 
 
@@ -88,6 +91,7 @@ def test_lessons_are_found() -> None:
         "03_learn_it",
         "04_why_the_sum_fails",
         "05_from_pixels",
+        "06_debug_an_agent",
     ]
 
 
@@ -164,6 +168,32 @@ def test_fifth_lesson_learns_from_pixels_what_is_exact() -> None:
     assert optimal[-1]
     assert errors[-1].max() < 0.05
     assert any(best and row.max() > 1.0 for best, row in zip(optimal, errors, strict=True))
+
+
+def test_sixth_lesson_names_each_planted_fault_and_no_other() -> None:
+    """From five logs: the done-when of the lesson. Dora is the healthy one."""
+    printed = printed_by(LESSONS[5])
+    row = r"^ +\d +ShiftedReward +WrongDiscount +IgnoredEnd +none$"
+    assert len(re.findall(row, printed, re.MULTILINE)) == 5
+    for name in ("Ada", "Ben", "Cleo"):
+        assert f"{name}, repaired: none" in printed
+
+
+def test_sixth_lesson_reads_to_a_student_what_is_wrong() -> None:
+    reports = {
+        name: " ".join(text.split())
+        for name, text in re.findall(
+            r"^(\w+)'s report says:\n((?:  .*\n)+)", printed_by(LESSONS[5]), re.MULTILINE
+        )
+    }
+    assert "It expects rewards 1 step too early." in reports["Ada"]
+    assert "and not by γ^w = 0.9025." in reports["Ben"]
+    assert "It ignores where episodes end" in reports["Cleo"]
+    complaints = ("too early", "too late", "and not by", "ignores", "times as much")
+    named = {name: [x for x in complaints if x in text] for name, text in reports.items()}
+    assert named["Emil"] == ["times as much"]
+    assert not named["Dora"]
+    assert "over its whole horizon" in reports["Dora"]
 
 
 @pytest.mark.parametrize("name", exercise.EXERCISES)

@@ -245,6 +245,43 @@ EXERCISES = {
             (2.5 / 3, "That is the mean over the components. Take the sum."),
         ),
     ),
+    "6.1": Exercise(
+        right=2,
+        hint="0.81 is 0.9 to which power?",
+        mistakes=(
+            (4, "That is what it should use: 0.9 to the power 4 is 0.6561."),
+            (1, "A missing power would give 0.9 itself."),
+            (8, "A doubled power would give 0.43. This one is halved."),
+        ),
+    ),
+    "6.2": Exercise(
+        right=[4, 0.5, 4],
+        hint="It uses the law as if the next episode were a part of this one.",
+        mistakes=(
+            ([4, 0, 0], "That is right, but this agent has it wrong."),
+            (
+                [4, 0.5, 1],
+                "What passes the horizon joins the residual: 0.5·(2 + 6).",
+            ),
+            ([4, 1, 8], "What is expected there is one step away. Discount it."),
+            (
+                [4, 0.5, 1, 3],
+                "Four entries, but N stays the same. Add the last two.",
+            ),
+        ),
+    ),
+    "6.3": Exercise(
+        right=1,
+        hint="Say of each line which steps it is about. With w = 2 there are steps 0 and 1.",
+        mistakes=(
+            (
+                2,
+                "It is right: the rewards of steps 0 and 1, the second discounted.",
+            ),
+            (3, "It is right: two steps pass, and the second one may be the last."),
+            (4, "It is right, if it is given the right state."),
+        ),
+    ),
 }
 
 

@@ -11,6 +11,8 @@ from trdlab.statistics import Estimate
 from trdlab.time_axis import step_label
 
 IN_ALL = "in all"
+WORTH_SAYING = 0.1
+"""The share of Σ|difference| below which a component is not told of."""
 
 Outcome = Literal["came", "missed", "open"]
 
@@ -195,6 +197,11 @@ def _outcome(came: Estimate) -> Outcome:
 
 
 def _furthest(trial: Trial) -> list[int]:
-    """Returns the components at which each action was forecast to be furthest ahead."""
+    """Returns the components at which each action was forecast to be furthest ahead.
+
+    One that holds less than `WORTH_SAYING` of all that differs is not worth a sentence.
+    """
     explicit = trial.found.predicted[: trial.found.time_axis.horizon]
-    return sorted({int(explicit.argmax()), int(explicit.argmin())}) if explicit.size else []
+    least = WORTH_SAYING * np.abs(explicit).sum()
+    furthest = {int(explicit.argmax()), int(explicit.argmin())} if explicit.size else set()
+    return sorted(i for i in furthest if abs(explicit[i]) >= least)

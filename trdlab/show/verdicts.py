@@ -13,6 +13,10 @@ TEMPLATES: dict[type[Claim], str] = {
         "The forecast can be trusted over its whole horizon, to {step:until}."
     ),
     verdicts.NotTrusted: "The forecast cannot be trusted at any step.",
+    verdicts.ConstantTo: (
+        "To {step:until} there was nothing to predict: the reward was always the same, and it "
+        "expects that."
+    ),
     verdicts.NothingTested: (
         "There was nothing to predict at any step: the reward was always the same."
     ),

@@ -26,6 +26,7 @@ from trdlab.explain.trust.shortcomings import (
 from trdlab.explain.trust.verdicts import (
     AsGoodAsCanBe,
     CannotBeKnown,
+    ConstantTo,
     CouldReach,
     FoilsNotTrusted,
     FoilsTrustedThroughout,
@@ -68,8 +69,9 @@ def _verdict(report: TrustReport) -> Findings:
     if found.components == axis.horizon:
         whole = (TrustedThroughout(axis.num_steps - 1),) if found.tested else (NothingTested(),)
         return (*whole, *_constant(report))
-    step = found.last_step
-    verdict: TrustFinding = NotTrusted() if step is None else TrustedTo(step)
+    last = found.components * axis.width - 1
+    claims = (NotTrusted(), ConstantTo(last), TrustedTo(last))
+    verdict = next(x for x in claims if x.holds(report))
     first, could = found.components, found.at_most * axis.width - 1
     few = int(report.calibration.num_episodes[first])
     reasons = (

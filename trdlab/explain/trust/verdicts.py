@@ -49,11 +49,23 @@ class TrustedThroughout(TrustFinding):
 
 @dataclass(eq=False, repr=False)
 class NotTrusted(TrustFinding):
-    """No step is to be trusted: none before the first failure was tested and passed."""
+    """No step is to be trusted: the first one already is not."""
+
+    def holds(self, report: TrustReport) -> bool:
+        passed, _ = _passed(report.calibration)
+        return passed == 0 < report.time_axis.horizon
+
+
+@dataclass(eq=False, repr=False)
+class ConstantTo(TrustFinding):
+    """Up to a step, before the first failure, the reward was always the same, and forecast so."""
+
+    step: int
 
     def holds(self, report: TrustReport) -> bool:
         passed, tested = _passed(report.calibration)
-        return tested == 0 and passed < report.time_axis.horizon
+        here = passed == _ends(self.step, report)
+        return tested == 0 < passed < report.time_axis.horizon and here
 
 
 @dataclass(eq=False, repr=False)
@@ -245,13 +257,13 @@ class FoilsTrustedThroughout(TrustFinding):
 
 @dataclass(eq=False, repr=False)
 class FoilsNotTrusted(TrustFinding):
-    """They are trusted at no step."""
+    """They are trusted at no step: the first one already is not."""
 
     def holds(self, report: TrustReport) -> bool:
         if report.foils is None:
             return False
-        passed, tested = _passed(report.foils)
-        return tested == 0 and passed < report.time_axis.horizon
+        passed, _ = _passed(report.foils)
+        return passed == 0 < report.time_axis.horizon
 
 
 def _limit_and_skill(report: TrustReport, component: int) -> tuple[Estimate, Estimate]:

@@ -11,6 +11,7 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Episode, collect
+from trdlab.explain.played import Played
 from trdlab.explain.promises import (
     BrokenPromise,
     Foreseen,
@@ -19,7 +20,6 @@ from trdlab.explain.promises import (
     broken_promises,
     foreseen,
 )
-from trdlab.explain.revision import Played
 from trdlab.explain.story import AsExpected, OtherThanExpected, key_rows, tell
 from trdlab.explain.surprises import (
     BeliefSurprise,

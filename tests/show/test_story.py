@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Episode, collect
+from trdlab.explain.played import Played, StoryClaim
 from trdlab.explain.promises import foreseen
-from trdlab.explain.revision import Played, StoryClaim
 from trdlab.explain.story import tell
 from trdlab.explain.surprises import sizes, surprise
 from trdlab.explain.trust.followed import what_followed
@@ -218,8 +218,8 @@ def test_the_plain_data_has_the_numbers_and_their_sentences():
     played = real()[7]
     data = json.loads(json.dumps(story_to_dict(tell(played)), allow_nan=False))
     assert data["steps"] == len(data["actions"]) == len(data["rewards"])
-    np.testing.assert_array_equal(data["predicted"], played.episode.predicted)
-    np.testing.assert_array_equal(data["revision"]["change"], played.revision.change)
+    np.testing.assert_array_equal(data["values"], played.episode.predicted.sum(axis=1))
+    np.testing.assert_array_equal(data["td_errors"], played.revision.change.sum(axis=1))
     text = " ".join(finding["sentence"] for finding in data["findings"])
     assert [claim.kind() for claim in check_story(text, played)] == [
         finding["kind"] for finding in data["findings"]

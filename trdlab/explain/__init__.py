@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
     from trdlab.explain.counterfactual import Counterfactual, play_to
     from trdlab.explain.episodes import Counting, Episode, collect
-    from trdlab.explain.revision import Played, Revision, revise
+    from trdlab.explain.played import Played, play
+    from trdlab.explain.revision import Revision, revise
     from trdlab.explain.story import Story, tell
     from trdlab.explain.trust.calibration import Calibration, calibrate
     from trdlab.explain.trust.ceiling import Ceiling
@@ -59,6 +60,7 @@ __all__ = [
     "gridworld_moment",
     "judge",
     "moment_of",
+    "play",
     "play_to",
     "revise",
     "run_agent",
@@ -86,7 +88,8 @@ _HOMES = {
     "Counting": "episodes",
     "Episode": "episodes",
     "collect": "episodes",
-    "Played": "revision",
+    "Played": "played",
+    "play": "played",
     "Revision": "revision",
     "revise": "revision",
     "Story": "story",

@@ -7,8 +7,8 @@ import numpy as np
 from trdlab.explain.episodes import Episode
 from trdlab.explain.finding import agrees
 from trdlab.explain.moment import same
+from trdlab.explain.played import Played, StoryClaim
 from trdlab.explain.promises import broken_promises, foreseen
-from trdlab.explain.revision import Played, StoryClaim
 from trdlab.explain.surprises import sizes, surprise
 
 MOMENTS = 5

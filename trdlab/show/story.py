@@ -5,9 +5,11 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from trdlab.explain import promises, story, surprises
 from trdlab.explain.finding import Claim, Shown
-from trdlab.explain.revision import Played, StoryClaim
+from trdlab.explain.played import Played, StoryClaim
 from trdlab.explain.story import Story, first_end
 from trdlab.formatting import amount, number
 from trdlab.show.templates import Form, Language, forms_of
@@ -99,17 +101,27 @@ def _forms(played: Played) -> dict[str, Form]:
     }
 
 
-LANGUAGE = Language[Played](TEMPLATES, _forms, about="this episode")
+STORIES = Language[Played](TEMPLATES, _forms, about="this episode")
 
 
 def story_sentences(told: Story) -> list[str]:
     """Returns the findings of a story as sentences, in their order."""
-    return [story_sentence(finding, told.played) for finding in told.findings]
+    return _said(told.findings, told)
+
+
+def story_lines(told: Story) -> list[str]:
+    """Returns its sentences with the moments numbered, as `story_figure` numbers them."""
+    moments = [f"{number}. {text}" for number, text in enumerate(_said(told.moments, told), 1)]
+    return [*_said(told.start, told), *moments, *_said(told.end, told)]
+
+
+def _said(findings: Sequence[StoryClaim], told: Story) -> list[str]:
+    return [story_sentence(finding, told.played) for finding in findings]
 
 
 def story_sentence(finding: StoryClaim, played: Played) -> str:
     """Returns one finding as a sentence; `t` in it is the step that it names, or else step 0."""
-    return LANGUAGE.say(finding, played)
+    return STORIES.say(finding, played)
 
 
 def check_story(text: str, played: Played) -> list[Claim]:
@@ -122,24 +134,26 @@ def check_story(text: str, played: Played) -> list[Claim]:
     Raises:
         UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
     """
-    return LANGUAGE.check(text, played)
+    return STORIES.check(text, played)
 
 
 def story_to_dict(told: Story) -> dict[str, Any]:
     """Returns a story, and the numbers of its episode, as plain data at full precision.
 
-    `predicted` is `[T, N+1]`, of the actions taken. `revision` has what each of its `steps`
-    changed, `[T′, N+1]`; a row sums to the TD error.
+    `values` is `[T]`, what was expected in all of the actions taken. `td_errors` is `[T]` too, by
+    how much more each step turned out to bring; `null` where a truncation hides it.
     """
     played = told.played
     episode, revision = played.episode, played.revision
+    errors = np.full(len(episode), np.nan)
+    errors[revision.steps] = revision.change.sum(axis=1)
     return {
         "steps": len(episode),
         "terminated": episode.terminated,
         "actions": [played.action(step) for step in range(len(episode))],
         "rewards": episode.rewards.tolist(),
-        "predicted": episode.predicted.tolist(),
-        "revision": {"steps": revision.steps.tolist(), "change": revision.change.tolist()},
+        "values": episode.predicted.sum(axis=1, dtype=np.float64).tolist(),
+        "td_errors": plain_data(errors),
         "findings": [
             plain_data(finding.to_dict()) | {"sentence": story_sentence(finding, played)}
             for finding in told.findings

@@ -1,0 +1,81 @@
+"""The picture of an episode, short and long, with and without costs and trust."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.explain.episodes import Episode
+from trdlab.explain.played import Played
+from trdlab.explain.story import tell
+from trdlab.explain.trust.trusted import Trust
+from trdlab.show.story_plots import plot_story, story_figure
+
+
+def played(total: int, axis: TimeAxis, *, cost: bool = False) -> Played:
+    """An episode with a reward every 20 steps that is always foreseen, and a surprise."""
+    t = np.arange(total)
+    rewards = np.where(t % 20 == 2, -1.0 if cost else 1.0, 0.0)
+    expected = np.zeros((total + 1, axis.num_components))
+    for k in range(min(total, axis.num_steps)):
+        expected[: total - k, k // axis.width] += axis.gamma**k * rewards[k:]
+    expected[total // 2, 0] += 2.0
+    known = RewardDecomposition(expected[:total, None], axis)
+    return Played(
+        Episode(
+            decomposition=known,
+            expected=expected,
+            actions=np.zeros(total, dtype=np.int64),
+            rewards=rewards,
+            life_lost=np.zeros(total, dtype=np.bool_),
+            ends=t == total - 1,
+            terminated=True,
+            random=np.zeros(total + axis.num_steps, dtype=np.bool_),
+        ),
+        ("wait",),
+    )
+
+
+@pytest.mark.parametrize("total", [1, 3, 500, 4_000])
+@pytest.mark.parametrize("axis", [TimeAxis(0.95, 40), TimeAxis(0.9, 3, 3), TimeAxis(0.95, 0)])
+def test_any_episode_can_be_drawn(total, axis):
+    figure = story_figure(tell(played(total, axis)), "an episode")
+    figure.canvas.draw()
+
+
+def test_the_columns_are_steps_the_rows_are_steps_ahead_and_costs_have_a_colour():
+    axis = TimeAxis(0.95, 4)
+    for cost in (False, True):
+        told = tell(played(30, axis, cost=cost))
+        ax, below = Figure().subplots(2, 1)
+        assert plot_story(ax, below, told) is ax
+        residual, explicit = ax.images
+        np.testing.assert_allclose(explicit.get_array(), told.played.episode.predicted[:, :4].T)
+        np.testing.assert_allclose(residual.get_array(), told.played.episode.predicted[:, 4:].T)
+        low, high = explicit.get_clim()
+        assert residual.get_clim() == (low, high)
+        assert low == (-high if cost else 0.0)
+        assert [label.get_text() for label in ax.get_yticklabels()][-2:] == ["t+3", "t+4…∞"]
+
+
+def test_moments_are_numbered_as_their_sentences_are():
+    told = tell(played(500, TimeAxis(0.95, 40)))
+    figure = story_figure(told, "an episode")
+    marks = [text.get_text() for text in figure.axes[0].texts]
+    assert ", ".join(marks) == ", ".join(str(i + 1) for i in range(len(told.moments)))
+    lines = figure.texts[-1].get_text().splitlines()
+    numbers = [line[0] for line in lines if line[0].isdigit()]
+    assert numbers == ", ".join(marks).split(", ")
+
+
+def test_what_is_not_to_be_trusted_is_faded():
+    axis = TimeAxis(0.95, 4)
+    told = tell(played(30, axis))
+    veils = []
+    for components, residual in ((4, True), (2, False)):
+        ax, below = Figure().subplots(2, 1)
+        plot_story(ax, below, told, Trust(axis, components, components, components, residual))
+        veils.append(sum(patch.get_alpha() is not None for patch in ax.patches))
+    assert veils == [0, 3]
+    text = story_figure(told, "", Trust(axis, 2, 2, 2, False)).texts[-1].get_text()
+    assert "faded: has not proved better than a guess" in text

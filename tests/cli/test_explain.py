@@ -1,6 +1,7 @@
 """`trdlab explain` as its users see it."""
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -62,7 +63,8 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(trdla
     assert "the future of the optimal policy" in out
     assert "The forecast can be trusted over its whole horizon, to t+3." in out
     assert "down is worth 3.52 and up 3.26." in out
-    names = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png", "calibration.png"]
+    moments = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png"]
+    names = [*moments, "episode-seed-0.png", "calibration.png"]
     paths = [Path("explanations") / "drone" / name for name in names]
     assert err.splitlines() == [f"Picture: {path}" for path in paths]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
@@ -79,6 +81,23 @@ def test_a_contrast_at_a_step_with_named_and_numbered_actions(trdlab):
     assert "With γ = 0.95 right is worth 0.84 and up 0.80." in out
     assert "How far to trust it" in out
     assert "first expected to cost" not in out  # that is the forecast
+
+
+def test_the_story_of_an_episode_as_text_as_json_and_as_a_picture(trdlab):
+    words = ("gridworld:loop,slip=0.2", "--what", "episode", "--seed", 3, "--episodes", 20)
+    code, out, err = trdlab(*words, "--out", "pictures")
+    assert code == 0
+    assert "loop,slip=0.2 · the episode with seed 3" in out
+    assert "At the start it expected rewards worth 1.14 in all" in out
+    assert re.search(r"\n *1\. ", out)
+    assert "The episode was cut off after 100 steps." in out
+    assert "The future of the optimal policy" in out
+    assert err == "Picture: pictures/episode-seed-3.png\n"
+    _, out, _ = trdlab(*words, "--json")
+    data = json.loads(out)
+    assert data["moment"] is None
+    assert (data["episode"]["seed"], data["episode"]["steps"]) == (3, 100)
+    assert data["episode"]["findings"][-1]["kind"] == "cut-off"
 
 
 def test_a_calibration_as_text_and_as_json(trdlab):
@@ -124,7 +143,7 @@ def test_a_run_says_how_long_a_step_is(trdlab, trained):
     _, out, _ = trdlab(trained, "--episodes", 12, "--out", "pictures")
     assert "a step is 0.25 s of play" in out
     assert "sign of each reward" in out
-    assert len(list(Path("pictures").iterdir())) == 3
+    assert len(list(Path("pictures").iterdir())) == 4
 
 
 def test_a_run_in_another_environment(trdlab, trained):

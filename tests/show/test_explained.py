@@ -106,6 +106,7 @@ def test_pictures_are_named_by_what_they_show(tmp_path):
     assert names == [
         "forecast-seed-3-step-7.png",
         "contrast-seed-3-step-7.png",
+        "episode-seed-3.png",
         "calibration.png",
     ]
 

@@ -24,7 +24,7 @@ def explain(
         typer.Option(
             "--what",
             metavar="PART,...",
-            help="forecast, contrast, calibration.",
+            help="forecast, contrast, episode, calibration.",
             show_default="what matters most",
         ),
     ] = None,

@@ -14,11 +14,14 @@ from trdlab.explain.assessment import Copying, assess, try_out
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Claim, Finding
 from trdlab.explain.limits import judged
+from trdlab.explain.played import play
+from trdlab.explain.story import Story, tell
 from trdlab.explain.tried import Trial, trial_findings
 from trdlab.explain.trust.findings import trust_findings
 from trdlab.explain.trust.report import TrustReport
 from trdlab.show.report import actions_to_dict
 from trdlab.show.sentences import MOMENTS, sentence
+from trdlab.show.story import STORIES, story_lines, story_sentence, story_to_dict
 from trdlab.show.templates import Language, checked, split
 from trdlab.show.text import action_table, fit, story
 from trdlab.show.trials import TRIALS, trial_sentence, trial_sentences
@@ -26,13 +29,14 @@ from trdlab.show.trust_data import plain_data, trust_to_dict
 from trdlab.show.verdicts import REPORTS, trust_sentence
 from trdlab.time_axis import TimeAxis, axis_title
 
-Part = Literal["forecast", "contrast", "calibration"]
+Part = Literal["forecast", "contrast", "episode", "calibration"]
 PARTS: tuple[Part, ...] = get_args(Part)
 SCHEMA = "trdlab.explain/1"
 
 _FIELDS: dict[Part, tuple[str, ...]] = {
     "forecast": ("forecast", "limits", "context"),
     "contrast": ("contrast", "flips", "limits", "context"),
+    "episode": (),
     "calibration": (),
 }
 _FAULTS = (
@@ -68,10 +72,11 @@ class Explained:
         parts: what was asked for; nothing, if only what matters most is told.
         seed: of the episode that the moment is in.
         step: of that episode.
-        explanation: of the moment; None where only the calibration was asked for.
+        explanation: of the moment; None where no part that speaks of one was asked for.
         report: how far forecasts can be trusted; None where no episodes were played.
         trial: what came of action and foil where they were tried; None where they were not, or
             where states cannot be copied.
+        story: of the whole episode; None where it was not asked for.
     """
 
     agent: Agent
@@ -81,6 +86,7 @@ class Explained:
     explanation: Explanation | None
     report: TrustReport | None
     trial: Trial | None = None
+    story: Story | None = None
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -133,7 +139,8 @@ def explain_agent(
             by where calibration was asked for.
     """
     wanted = parts or PARTS
-    moment = None if wanted == ("calibration",) else agent.moment(seed=seed, step=step)
+    is_of_moment = any(_FIELDS[part] for part in wanted)
+    moment = agent.moment(seed=seed, step=step) if is_of_moment else None
     chosen = None if action is None else agent.action(action)
     other = None if foil is None else agent.action(foil)
     pair = None if moment is None else moment.pair(chosen, other)  # fails before what takes long
@@ -142,6 +149,7 @@ def explain_agent(
     count = (50 if agent.world is None else 300) if episodes is None else episodes
     if "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for --episodes 50.")
+    told = tell(play(agent, seed)) if "episode" in wanted else None
     copying = Copying() if "calibration" in wanted else None
     report = (
         assess(agent, episodes=count, copying=copying, on_episode=on_episode) if count else None
@@ -152,7 +160,7 @@ def explain_agent(
     trial = None
     if pair is not None and pair[1] is not None and "contrast" in wanted:
         trial = try_out(agent, pair[0], pair[1], seed=seed, step=step)
-    return Explained(agent, parts, seed, step, explanation, report, trial)
+    return Explained(agent, parts, seed, step, explanation, report, trial, told)
 
 
 def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
@@ -188,6 +196,14 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
         add("Tried out", "bold")
         for text in [_NOT_TRIED] if explained.trial is None else trial_sentences(explained.trial):
             add(text, indent=2)
+    if explained.story is not None:
+        add(f"The episode with seed {explained.seed}", "bold")
+        for text in story_lines(explained.story):
+            add(text, indent=2)
+        add("t is the step that a sentence names; the first one is step 0.", "dim", 2)
+        add(_whose(explained), "dim", 2)
+        if "calibration" not in explained.parts and explained.report is not None:
+            add(_trust(explained.report)[0], "dim", 2)
     if "calibration" in explained.parts and explained.report is not None:
         add("How far its forecasts can be trusted", "bold")
         for text in _trust(explained.report):
@@ -198,8 +214,8 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
 def summary(explained: Explained) -> list[str]:
     """Returns the few sentences that matter most.
 
-    Whose future it is, how far it can be trusted and why no further, what the action promises, and
-    why not the next best.
+    Whose future it is, how far it can be trusted and why no further, what the action promises, why
+    not the next best, and the moment of the episode that surprised most, if one did.
     """
     texts: list[str] = []
     explanation, report = explained.explanation, explained.report
@@ -217,6 +233,8 @@ def summary(explained: Explained) -> list[str]:
     if explained.trial is not None:
         tried = [x for x in trial_findings(explained.trial) if x.kind() in _OUTCOMES]
         texts += [trial_sentence(finding, explained.trial) for finding in tried]
+    if explained.story is not None and explained.story.most is not None:
+        texts.append(story_sentence(explained.story.most, explained.story.played))
     return texts
 
 
@@ -234,6 +252,7 @@ def check_explained(text: str, explained: Explained) -> list[Claim]:
         (MOMENTS, explained.explanation),
         (REPORTS, explained.report),
         (TRIALS, explained.trial),
+        (STORIES, None if explained.story is None else explained.story.played),
     )
     known = [(language, subject) for language, subject in subjects if subject is not None]
     return [checked(piece, known) for piece in split(text)]
@@ -267,6 +286,9 @@ def to_dict(explained: Explained) -> dict[str, Any]:
         "summary": summary(explained),
         "moment": moment,
         "trial": None if explained.trial is None else _trial_to_dict(explained.trial),
+        "episode": None
+        if explained.story is None
+        else {"seed": explained.seed} | story_to_dict(explained.story),
         "calibration": None if report is None else trust_to_dict(report),
     }
 
@@ -299,6 +321,8 @@ def _heading(explained: Explained) -> str:
         words.append(f"step {explained.step} of the episode with seed {explained.seed}")
         foil = f" or {explanation.foil}" if explanation.foil is not None else ""
         words.append(f"{explanation.action}{foil}")
+    elif explained.story is not None:
+        words.append(f"the episode with seed {explained.seed}")
     return " · ".join(words)
 
 
@@ -308,6 +332,11 @@ def _setting(explained: Explained) -> str:
     if seconds is not None:
         words.append(f"a step is {seconds:.2g} s of play")
     return " · ".join(words)
+
+
+def _whose(explained: Explained) -> str:
+    future = explained.agent.estimator.future
+    return f"The future of {future.policy} · {future.reward} · ends at {future.ending}"
 
 
 def _told(findings: Sequence[Finding], explanation: Explanation) -> list[str]:

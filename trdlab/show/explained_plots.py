@@ -16,6 +16,7 @@ from trdlab.explain.trust.report import TrustReport
 from trdlab.files import check_output, write_whole
 from trdlab.show.explained import PARTS, Explained, Part
 from trdlab.show.plots import plot_components, plot_contrast, plot_uncertainty, share_scale
+from trdlab.show.story_plots import story_figure
 from trdlab.show.trust import plot_trust
 from trdlab.time_axis import axis_title
 
@@ -41,9 +42,9 @@ def picture_paths(
     Raises:
         OutputError: one of them exists, or cannot be written.
     """
+    ending = {"episode": f"-seed-{seed}", "calibration": ""}
     moment = f"-seed-{seed}-step-{step}"
-    names = {part: part + ("" if part == "calibration" else moment) for part in parts or PARTS}
-    paths = {part: folder / f"{name}.png" for part, name in names.items()}
+    paths = {part: folder / f"{part}{ending.get(part, moment)}.png" for part in parts or PARTS}
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"'{folder}' is a file.", "Name a folder for the pictures.")
     for path in paths.values() if folder.is_dir() else ():
@@ -85,6 +86,10 @@ def part_figure(explained: Explained, part: Part) -> Figure | None:
     explanation, report = explained.explanation, explained.report
     if part == "calibration":
         return None if report is None else trust_figure(report, explained.agent.name)
+    if part == "episode":
+        title = f"{explained.agent.name}, the episode with seed {explained.seed}"
+        trust = None if report is None else report.trust
+        return None if explained.story is None else story_figure(explained.story, title, trust)
     if explanation is None or (part == "contrast" and explanation.foil is None):
         return None
     foil = explanation.foil if part == "contrast" else None

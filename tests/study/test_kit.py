@@ -15,7 +15,8 @@ TRIALS = draw_trials(3, 6)
 
 
 def test_the_page_and_the_text_ask_the_same():
-    page, printed = html(TRIALS), " ".join(text(TRIALS).split())
+    page = html(TRIALS).replace("\N{NO-BREAK SPACE}", " ")
+    printed = " ".join(text(TRIALS).split())
     for number, trial in enumerate(TRIALS, 1):
         assert f"Trial {number} of 6" in page
         assert f"Trial {number} of 6" in printed
@@ -75,5 +76,6 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="file' is a file"):
         write_kit(tmp_path / "file", TRIALS, 3)
-    with pytest.raises(OutputError, match=r"Cannot make .*Choose another --out"):
-        write_kit(tmp_path / "file" / "kit", TRIALS, 3)
+    for impossible in (tmp_path / "file" / "kit", tmp_path / "\0", tmp_path / ("x" * 300)):
+        with pytest.raises(OutputError, match=r"Cannot make .*Choose another --out"):
+            write_kit(impossible, TRIALS, 3)

@@ -98,6 +98,13 @@ def test_a_file_that_holds_no_readers_is_refused(content: str, tmp_path: Path):
         read_given(path)
 
 
+def test_two_readers_of_one_name_are_not_taken_for_one(tmp_path: Path):
+    path = tmp_path / "given.json"
+    path.write_text('{"Ada": "ABC", "Ben": "ABC", "Ada": "CCC"}')
+    with pytest.raises(InputError, match=r"2 readers are called 'Ada'. Give each its own name."):
+        read_given(path)
+
+
 def test_a_torn_or_missing_file_is_told(tmp_path: Path):
     (tmp_path / "torn.json").write_text('{"schema": ')
     for name, message in (("torn.json", "is torn"), ("none.json", "cannot be read")):

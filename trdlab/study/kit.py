@@ -20,6 +20,7 @@ SCHEMA = "trdlab.study/1"
 PAGE, QUESTIONS, ANSWERS = "study.html", "questions.txt", "answers.json"
 _TEMPLATE = Path(__file__).parent / "page.html"
 _WIDTH = 78
+_NO_BREAK = "\N{NO-BREAK SPACE}"
 _QUESTION = "Which agent is it?"
 _INTRO = (
     "Three agents act on the same map. Each of them is rewarded for other things, and acts as is "
@@ -49,8 +50,7 @@ def write_kit(folder: Path, trials: Sequence[Trial], seed: int) -> tuple[Path, .
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        reason = error.strerror or error
-        raise OutputError(f"Cannot make '{folder}': {reason}.", "Choose another --out.") from error
+        raise _unwritable(folder, error) from error
     page, questions, answers = paths
     write_whole(page, _writing(html(trials)))
     write_whole(questions, _writing(text(trials)))
@@ -64,12 +64,17 @@ def kit_paths(folder: Path) -> tuple[Path, ...]:
     Raises:
         OutputError: one of them does, or the folder is a file.
     """
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"'{folder}' is a file.", "Name a folder for the kit.")
     paths = tuple(folder / name for name in (PAGE, QUESTIONS, ANSWERS))
-    for path in paths:
-        if path.exists():
-            raise OutputError(f"The file '{path}' exists.", "Choose another --out.")
+    try:
+        folder.resolve()  # raises where no folder can have this name
+        is_file = folder.exists() and not folder.is_dir()
+        there = [path for path in paths if path.exists()]
+    except (OSError, ValueError) as error:
+        raise _unwritable(folder, error) from error
+    if is_file:
+        raise OutputError(f"'{folder}' is a file.", "Name a folder for the kit.")
+    if there:
+        raise OutputError(f"The file '{there[0]}' exists.", "Choose another --out.")
     return paths
 
 
@@ -112,10 +117,15 @@ def html(trials: Sequence[Trial]) -> str:
     )
 
 
+def _unwritable(folder: Path, error: Exception) -> OutputError:
+    reason = getattr(error, "strerror", None) or error
+    return OutputError(f"Cannot make '{folder}': {reason}.", "Choose another --out.")
+
+
 def _fieldset(trial: Trial, number: int, count: int) -> str:
     lines = [f"<fieldset><legend>Trial {number} of {count}</legend>"]
     for heading, sentences in trial.parts:
-        items = "".join(f"<li>{escape(told)}</li>" for told in sentences)
+        items = "".join(f"<li>{_unbroken(escape(told))}</li>" for told in sentences)
         lines += [f"<h3>{escape(heading)}</h3>", f"<ul>{items}</ul>"]
     lines += [f'<p class="ask">{_QUESTION}</p>', '<div class="choices">']
     lines += [
@@ -155,9 +165,13 @@ def _paragraph(words: str) -> str:
 
 
 def _wrapped(words: str, first: str = "", later: str = "") -> str:
-    joined = words.replace(" %", "\N{NO-BREAK SPACE}%")
-    filled = textwrap.fill(joined, _WIDTH, initial_indent=first, subsequent_indent=later)
-    return filled.replace("\N{NO-BREAK SPACE}", " ")
+    filled = textwrap.fill(_unbroken(words), _WIDTH, initial_indent=first, subsequent_indent=later)
+    return filled.replace(_NO_BREAK, " ")
+
+
+def _unbroken(words: str) -> str:
+    """Returns a text in which no line begins with a percent sign."""
+    return words.replace(" %", f"{_NO_BREAK}%")
 
 
 def _writing(content: str) -> Callable[[Path], object]:

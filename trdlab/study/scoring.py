@@ -1,5 +1,6 @@
 """Scores of a blind reading, against what guessing gets."""
 
+import json
 import re
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping
@@ -122,7 +123,7 @@ def read_given(path: Path) -> dict[str, str]:
 
     Raises:
         TrdlabError: it cannot be read, or is torn.
-        InputError: it holds something else.
+        InputError: it holds something else, or two readers of one name.
     """
     data = read_json(path)
     if not isinstance(data, dict) or not all(isinstance(x, str) for x in data.values()):
@@ -130,6 +131,7 @@ def read_given(path: Path) -> dict[str, str]:
             f"'{path}' does not hold what readers answered.",
             'Write one object: a name and letters for each, {"Ada": "ABCABC…", …}.',
         )
+    json.loads(path.read_bytes(), object_pairs_hook=_unique)
     return {name: normal(letters) for name, letters in data.items()}
 
 
@@ -229,6 +231,13 @@ def _table(*columns: str) -> Table:
 
 def _small(p_value: float) -> str:
     return "below 0.0001" if p_value < 1e-4 else f"{p_value:.2g}"
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> None:
+    """Checks that no two readers have the same name: a dict would keep one of them only."""
+    for name, times in Counter(name for name, _ in pairs).items():
+        if times > 1:
+            raise InputError(f"{times} readers are called '{name}'.", "Give each its own name.")
 
 
 def _is_answers(answers: object) -> bool:

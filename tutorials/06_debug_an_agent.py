@@ -406,3 +406,5 @@ check("6.3", answer_3)
 # - To be trusted means to be better than a constant guess, and no more than that.
 # - Vectors must fit what happens, *and* each other. The second test finds what the first misses.
 # - A named fault is a search order: you know which line to look for.
+# - Not every mistake has a name. Emil's is one of the code that was published with the paper: see
+#   [errata C1](../errata.md#c1).

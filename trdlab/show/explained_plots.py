@@ -15,7 +15,13 @@ from trdlab.explain.tried import Trial
 from trdlab.explain.trust.report import TrustReport
 from trdlab.files import check_output, write_whole
 from trdlab.show.explained import PARTS, Explained, Part
-from trdlab.show.plots import plot_components, plot_contrast, plot_uncertainty, share_scale
+from trdlab.show.plots import (
+    plot_components,
+    plot_contrast,
+    plot_uncertainty,
+    share_scale,
+    whiskers,
+)
 from trdlab.show.story_plots import story_figure
 from trdlab.show.trust import plot_trust
 from trdlab.time_axis import axis_title
@@ -197,8 +203,9 @@ def _foot(figure: Figure, moment: Moment, height: float) -> None:
     future, trust = moment.future, moment.trust
     is_faded = trust is not None and bool(trust.doubtful.any())
     faded = " · faded: has not proved better than a guess" if is_faded else ""
+    meaning = whiskers(moment)
     lines = (
-        f"{axis_title(moment.time_axis)}{faded}",
+        f"{axis_title(moment.time_axis)}{faded}{meaning and f' · {meaning}'}",
         f"after the first action the future of {future.policy}",
         f"{future.reward} · ends at {future.ending}",
     )

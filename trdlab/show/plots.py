@@ -79,8 +79,7 @@ def report_figure(report: Report) -> Figure:
     )
     for ax, name, colour in zip(axes, names, (_ACTION, _FOIL), strict=False):
         plot_components(ax, moment.components(name), axis, colour=colour)
-        if moment.uncertainty is not None:
-            plot_uncertainty(ax, moment, name)
+        plot_uncertainty(ax, moment, name)
         ax.set_title(_title(moment, name), fontsize=10, loc="left")
     if foil is not None:
         plot_contrast(axes[-1], moment, action, foil)
@@ -88,12 +87,13 @@ def report_figure(report: Report) -> Figure:
             ax.label_outer()
         share_scale(axes[:-1])
     right.supylabel("expected discounted reward", fontsize=9, color=_MUTED)
+    meaning = whiskers(moment)
     figure.text(
         0.5,
         0.012,
         f"γ = {plain(axis.gamma)}, N = {axis.horizon}, w = {axis.width} · after the first action "
         f"the future of {moment.future.policy} · {moment.future.reward} · ends at "
-        f"{moment.future.ending}{_whiskers(moment)}",
+        f"{moment.future.ending}{meaning and f' · {meaning}'}",
         fontsize=8,
         color=_MUTED,
         ha="center",
@@ -253,35 +253,53 @@ def plot_components(ax: Axes, components: FloatArray, axis: TimeAxis, *, colour:
 
 
 def plot_uncertainty(ax: Axes, moment: Moment, action: str) -> Axes:
-    """Adds to an action's bars one standard deviation each, and the chance of still being alive.
+    """Adds whiskers to an action's bars, and the chance of still being alive where it is known.
 
-    Survival is a thin line of steps, read on the right; it is left out where the episode cannot
-    end within the components.
+    A whisker is one standard deviation of the reward; where that is not known, what such forecasts
+    are off by (see `whiskers`). Survival is a thin line of steps, read on the right; it is left out
+    where the episode cannot end within the components.
 
     Args:
         ax: the axes with the bars.
-        moment: the decompositions, and their uncertainty.
+        moment: the decompositions, and their uncertainty or error.
         action: the name of the action.
 
     Returns:
         `ax`.
     """
-    known, a, positions = moment.uncertainty, moment.index(action), _positions(moment.time_axis)
-    if known is None:
-        return ax
-    means, deviation = moment.components(action), known.deviation[a]
-    shown = deviation > 0.0
+    a, positions = moment.index(action), _positions(moment.time_axis)
+    means, length = moment.components(action), _lengths(moment)[a]
+    shown = length > 0.0  # not so if it is NaN
     ax.errorbar(
-        positions[shown], means[shown], deviation[shown], fmt="none", ecolor="black", capsize=2.0
+        positions[shown], means[shown], length[shown], fmt="none", ecolor="black", capsize=2.0
     )
-    if known.survival[a, -1] < 1.0:
+    if moment.uncertainty is not None and moment.uncertainty.survival[a, -1] < 1.0:
         right = ax.twinx()
-        right.step(positions, known.survival[a], where="mid", color=_POLICY, linewidth=1.0)
+        right.step(
+            positions, moment.uncertainty.survival[a], where="mid", color=_POLICY, linewidth=1.0
+        )
         right.set(ylim=(0.0, 1.15), yticks=(0.0, 0.5, 1.0))
         right.set_ylabel("still running", fontsize=8, color=_POLICY)
         right.tick_params(labelsize=7, colors=_POLICY)
         right.spines[["top", "left"]].set_visible(False)
     return ax
+
+
+def whiskers(moment: Moment) -> str:
+    """Returns what the whiskers of `plot_uncertainty` mean, empty where there are none."""
+    if not (_lengths(moment) > 0.0).any():
+        return ""
+    if moment.uncertainty is not None:
+        return "whiskers: one standard deviation"
+    return "whiskers: what such forecasts are off by (root mean square)"
+
+
+def _lengths(moment: Moment) -> FloatArray:
+    """Returns `[A, N+1]`: how long whiskers are, 0 or NaN where there are none."""
+    if moment.uncertainty is not None:
+        return moment.uncertainty.deviation
+    error = 0.0 if moment.error is None else moment.error
+    return np.broadcast_to(error, moment.decomposition.components.shape)
 
 
 def plot_contrast(ax: Axes, moment: Moment, action: str, foil: str) -> Axes:
@@ -306,11 +324,6 @@ def plot_contrast(ax: Axes, moment: Moment, action: str, foil: str) -> Axes:
     gap = moment.q_value(action) - moment.q_value(foil)
     ax.set_title(f"{action} − {foil}: {_short(gap)} in all", fontsize=10, loc="left")
     return ax
-
-
-def _whiskers(moment: Moment) -> str:
-    drawn = moment.uncertainty is not None and bool(moment.uncertainty.deviation.any())
-    return " · whiskers: one standard deviation" if drawn else ""
 
 
 def _positions(axis: TimeAxis) -> FloatArray:

@@ -9,7 +9,7 @@ from trdlab.estimator import Future
 from trdlab.explain import explain
 from trdlab.explain.finding import Finding
 from trdlab.explain.moment import Moment
-from trdlab.explain.rhythm import Peak, Peaks, Rhythm, Spread, peaks, prominence
+from trdlab.explain.rhythm import Peak, Peaks, Rhythm, Spread, Steady, peaks, prominence
 from trdlab.explain.tabular import gridworld_moment
 from trdlab.explain.trust.trusted import Trust
 from trdlab.gridworld import Gridworld, load_map
@@ -88,6 +88,21 @@ def test_the_largest_is_that_without_the_discount():
         "Before t+20 the largest reward to be expected of go is that of t+15"
     )
     assert said[Peak].endswith("worth 0.69 now.")
+
+
+def test_a_reward_that_hardly_varies_has_no_peak_and_is_called_the_same():
+    said = told(learned(1.0 + np.clip(noise(0, 0.01), -0.02, 0.02)))
+    (first, *_) = said.values()
+    assert (
+        first
+        == "At each step before t+40 about the same reward is expected of go: 1.00 on average."
+    )
+    assert not {Peak, Peaks, Rhythm, Spread} & set(said)
+    assert (
+        "about the same cost is expected of go: -1 on average"
+        in told(learned(-np.ones(11)))[Steady]
+    )
+    assert Steady not in told(learned(1.0 + 0.2 * STEPS / 40.0))
 
 
 def test_a_wide_peak_is_said_to_be_uncertain_or_drawn_out_but_not_of_what_is_exact():

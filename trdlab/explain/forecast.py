@@ -9,7 +9,7 @@ from trdlab.explain.chances import chances, likelihood
 from trdlab.explain.finding import Finding, agrees, one_sign
 from trdlab.explain.limits import doubtful, explicit_end
 from trdlab.explain.moment import Moment
-from trdlab.explain.rhythm import effect_of, largest, regular, stands_out, undiscounted
+from trdlab.explain.rhythm import effect_of, largest, regular, stands_out, steady, undiscounted
 
 _MATTERS = 0.5
 """An error is told that is at least this share of what is expected."""
@@ -36,16 +36,21 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
         return ()
     if not row[:end].any():
         return (*_nothing(moment, action), *chances(moment, action))
-    firsts = tuple(_firsts(moment, action))
-    named = {first.component for first in firsts}
+    always = steady(moment, action)
     return (
-        *firsts,
-        *likelihood(moment, action),
-        *regular(moment, action, named),
+        *(_when(moment, action) if always is None else [always]),
         *_accuracy(moment, action),
         *_whole(moment, action),
         *chances(moment, action),
     )
+
+
+def _when(moment: Moment, action: str) -> Iterator[Finding]:
+    """Yields what comes first, how likely the largest reward is, and where rewards peak."""
+    firsts = tuple(_firsts(moment, action))
+    yield from firsts
+    yield from likelihood(moment, action)
+    yield from regular(moment, action, {first.component for first in firsts})
 
 
 def _nothing(moment: Moment, action: str) -> tuple[Finding, ...]:

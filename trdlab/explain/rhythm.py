@@ -14,6 +14,9 @@ from trdlab.explain.moment import Moment
 SHARE = 0.2
 """What stands out: at least this share of the largest that is expected at any one step."""
 
+ALIKE = 0.05
+"""How far what is about the same may be from its mean, as a share of that."""
+
 UNEVEN = 0.25
 """How far the spacings of a rhythm may be from their mean, as a share of it."""
 
@@ -84,6 +87,13 @@ def largest(moment: Moment, action: str) -> int:
     return int(np.abs(_shares(moment, action)).argmax())
 
 
+def steady(moment: Moment, action: str) -> "Steady | None":
+    """Returns that every step pays about the same, where that is so."""
+    row, end = undiscounted(moment, action), explicit_end(moment)
+    claim = Steady(action, end, effect_of(row[0]), float(row.mean())) if row.size else None
+    return claim if claim is not None and claim.holds(moment) else None
+
+
 def regular(moment: Moment, action: str, named: Collection[int] = ()) -> tuple[Finding, ...]:
     """Returns a rhythm, or the largest component and the peaks, and how wide the highest peak is.
 
@@ -146,8 +156,33 @@ def _flanks(shares: FloatArray, peak: int) -> tuple[int, int]:
 
 
 @dataclass(eq=False, repr=False)
+class Steady(Finding):
+    """Each of three or more steps is within `ALIKE` of their mean; w = 1."""
+
+    action: str
+    end: int
+    effect: str
+    mean: float
+
+    def holds(self, moment: Moment) -> bool:
+        row = undiscounted(moment, self.action)
+        if self.end != explicit_end(moment) or len(row) < 3 or moment.time_axis.width != 1:
+            return False
+        mean = float(row.mean())
+        return (
+            mean != 0.0
+            and bool((np.abs(row - mean) <= ALIKE * abs(mean)).all())
+            and self.effect == effect_of(mean)
+            and agrees(self.mean, mean)
+        )
+
+
+@dataclass(eq=False, repr=False)
 class Peak(Finding):
-    """The largest of several components, without their discount, of those before `end`."""
+    """The largest of several components, without their discount, of those before `end`.
+
+    Of what was learned it has to be a peak.
+    """
 
     action: str
     end: int
@@ -163,6 +198,7 @@ class Peak(Finding):
         return (
             int(np.count_nonzero(stands_out(moment, self.action))) > 1
             and bool((np.delete(shares, i) < shares[i]).all())
+            and (moment.is_exact or i in peaks(moment, self.action))
             and self.effect == effect_of(value)
             and agrees(self.discounted, value)
         )

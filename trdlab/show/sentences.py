@@ -72,6 +72,10 @@ TEMPLATES: dict[type[Claim], str] = {
         "After {action} the chance of the reward of {reward:amount} at {component:when} is put at "
         "{chance:percent}."
     ),
+    rhythm.Steady: (
+        "At each step before {end:begin} about the same {effect:effect} is expected of {action}: "
+        "{mean:amount} on average."
+    ),
     rhythm.Rhythm: (
         "Before {end:begin} the {effect:effect} expected of {action} peaks about every "
         "{period:steps}, from {first:label} to {last:label}."

@@ -195,6 +195,7 @@ def test_an_agent_that_circles_promises_what_never_comes(component):
     assert circling.rewards.sum() == 0.0
     assert broken_promises(told) == (BrokenPromise(0, 19, component),)
     assert tell(told).most == BrokenPromise(0, 19, component)
+    assert len(tell(told).moments) == 1  # and not each step of it
 
 
 def test_a_promise_that_is_kept_later_is_late_and_one_that_is_kept_in_time_is_none():

@@ -203,10 +203,10 @@ def promised(episode: Episode) -> IntArray:
     return np.where((largest > 0.0) & (largest >= least[best]), best, -1)
 
 
-def broken_promises(played: Played) -> tuple[StoryClaim, ...]:
+def broken_promises(played: Played) -> tuple[BrokenPromise | LatePromise, ...]:
     """Returns the promises that were not kept in time, the longest first."""
     found = sorted(_stays(played.episode), key=lambda stay: stay[0] - stay[1])
-    claims: list[StoryClaim] = []
+    claims: list[BrokenPromise | LatePromise] = []
     for stay in found:
         broken = BrokenPromise(*stay)
         kept = broken._kept_at(played)

@@ -15,6 +15,8 @@ MOMENTS = 5
 """How many moments of an episode are told."""
 SHARE = 0.05
 """A surprise is told if it is larger than this share of `Played.scale`."""
+STANDS_OUT = 0.25
+"""A surprise may be what matters most if it is larger than this share of `Played.scale`."""
 ROUNDING = 1e-9
 """What is smaller than this share of `Played.scale` is no surprise at all."""
 
@@ -183,20 +185,23 @@ def tell(played: Played, *, moments: int = MOMENTS) -> Story:
     """
     broken = broken_promises(played)[:1]
     told = [*broken, *foreseen(played)[:1]][:moments]
-    rows = key_rows(played, moments - len(told))
+    goes_on = not played.episode.terminated  # past what was seen, so its last step ends no promise
+    cut = len(played.episode) - 1 if goes_on else None
+    stays = [range(of.first, of.last + (of.last == cut)) for of in broken]
+    rows = key_rows(played, moments - len(told), *stays)
     surprises = [surprise(played, row) for row in rows]
-    large = bool(rows) and sizes(played)[rows[0]] > 5 * SHARE * played.scale
+    large = bool(rows) and sizes(played)[rows[0]] > STANDS_OUT * played.scale
     first = (*broken, *(surprises[:1] if large else ()))
     return Story(
         played=played,
         start=_start(played),
         moments=tuple(sorted([*told, *surprises], key=lambda claim: claim.place or 0)),
-        end=_end(played, any_surprise=bool(surprises)),
+        end=_end(played, is_calm=not surprises and not broken),
         most=first[0] if first else None,
     )
 
 
-def key_rows(played: Played, count: int) -> list[int]:
+def key_rows(played: Played, count: int, *told: range) -> list[int]:
     """Returns the rows of the revision that surprise most, spread over the episode; most first.
 
     Of two that are closer than T/(2·count) steps, or than w, the less surprising one is left out,
@@ -205,6 +210,7 @@ def key_rows(played: Played, count: int) -> list[int]:
     Args:
         played: the episode.
         count: how many there are, at most.
+        told: steps of which something else is told already.
     """
     found, steps = sizes(played), played.revision.steps
     apart = max(played.episode.time_axis.width, len(played.episode) / (2 * max(count, 1)))
@@ -212,7 +218,8 @@ def key_rows(played: Played, count: int) -> list[int]:
     for row in np.argsort(-found, kind="stable").tolist():
         if len(chosen) >= count or found[row] <= SHARE * played.scale:
             break
-        if (np.abs(steps[chosen] - steps[row]) >= apart).all():
+        is_new = not any(steps[row] in of for of in told)
+        if is_new and (np.abs(steps[chosen] - steps[row]) >= apart).all():
             chosen.append(row)
     return chosen
 
@@ -227,11 +234,11 @@ def _start(played: Played) -> tuple[StoryClaim, ...]:
     return (ExpectedAtStart(value, int(np.abs(row).argmax())),)
 
 
-def _end(played: Played, *, any_surprise: bool) -> tuple[StoryClaim, ...]:
+def _end(played: Played, *, is_calm: bool) -> tuple[StoryClaim, ...]:
     episode, until = played.episode, first_end(played.episode)
     end: list[StoryClaim] = []
     found = sizes(played)
-    if found.size and not any_surprise:
+    if found.size and is_calm:
         most = float(found.max())
         end.append(LittleChanged(most) if most > ROUNDING * played.scale else NothingChanged())
     end.append((Ended if episode.terminated else CutOff)(len(episode)))

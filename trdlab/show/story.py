@@ -207,7 +207,7 @@ def _decimals(value: float) -> int:
 def _steps(steps: Sequence[int], seconds: float | None) -> str:
     """Returns so many steps, or from so many to so many, with their seconds of play."""
     counts = " to ".join(f"{count:,}" for count in steps)
-    times = "" if seconds is None else " to ".join(f"{count * seconds:.2g}" for count in steps)
+    times = "" if seconds is None else " to ".join(_gap(count * seconds) for count in steps)
     noun = "step" if steps[-1] == 1 else "steps"
     return f"{counts} {noun}" + (f" ({times} s)" if times else "")
 

@@ -121,7 +121,10 @@ def _plot_rewards(ax: Axes, told: Story) -> None:
         if 0 < at.size < _MOST_DOTS:
             ax.plot(at, rewards[at], "o" if colour == _REWARD else "v", color=colour, markersize=4)
     ax.axhline(0.0, color="black", linewidth=0.8)
-    ax.margins(y=0.2)
+    if rewards.any():
+        ax.margins(y=0.2)
+    else:
+        ax.set(ylim=(-0.1, 1.0), yticks=(0.0,))
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=10))
     ax.set_xlabel("step of the episode", fontsize=9, color=_MUTED)
     ax.set_ylabel("reward", fontsize=9, color=_MUTED)
@@ -138,7 +141,8 @@ def _mark_moments(ax: Axes, below: Axes, told: Story) -> None:
     for claim in told.moments:
         if isinstance(claim, BrokenPromise | LatePromise):
             rows = [claim.component] * 2
-            ax.plot([claim.first, claim.last], rows, color=_MARK, linewidth=1.5, zorder=4)
+            for colour, width in (("white", 3.5), (_MARK, 1.5)):
+                ax.plot([claim.first, claim.last], rows, color=colour, linewidth=width, zorder=4)
     near = _NEAR * len(told.played.episode)
     starts = [0, *(i + 1 for i, (a, b) in enumerate(pairwise(places)) if b - a > near)]
     for start, stop in zip(starts, [*starts[1:], len(places)], strict=True):

@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from trdlab.decomposition import TimeAxis
+from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
-from trdlab.explain import gridworld_agent
+from trdlab.estimator import Future
+from trdlab.explain import Moment, explain, gridworld_agent
 from trdlab.show import explain_agent, summary
 from trdlab.show.explained import Explained, Part, check_explained, parse_parts, to_dict
 from trdlab.show.explained_plots import moment_figure, part_figure, picture_paths
@@ -91,6 +92,20 @@ def test_bars_that_are_not_to_be_trusted_are_faded():
         alpha = [bar.get_alpha() for bar in ax.patches]
         assert [a is not None for a in alpha] == [False, False, True, True, False]
     assert "faded" in figure.texts[-1].get_text()
+
+
+def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
+    rows = np.array([[1.0, 0.9, 94.5], [1.0, -0.8, 2.0]])
+    axis = TimeAxis(0.95, 2)
+    moment = Moment(RewardDecomposition(rows, axis), ("left", "right"), Future("a policy"))
+    figure = moment_figure(explain(moment, "left", "right"), "right", "")
+    action, foil, contrast = figure.axes
+    assert action.get_ylim() == foil.get_ylim() == (-1.5, 1.5)
+    notes = [[text.get_text() for text in ax.texts] for ax in figure.axes]
+    assert notes[0][-1] == "↑ 94.5"
+    assert notes[1][-1] == "↑ 2"
+    assert notes[2][-1] == "↑ 92.5"
+    assert contrast.get_ylim()[1] < 3.0
 
 
 def test_there_is_a_picture_only_of_what_there_is():

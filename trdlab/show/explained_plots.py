@@ -1,5 +1,6 @@
 """Pictures of an explained agent: what it expects, what cannot be trusted of that, and why."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -8,7 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from trdlab.arrays import FloatArray
 from trdlab.errors import OutputError
+from trdlab.explain.contrast import difference
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.moment import Moment
 from trdlab.explain.tried import Trial
@@ -32,6 +35,7 @@ _FADED = 0.25
 _WIDTH = 8.0
 _PANEL = 2.2
 _FOOT = 0.5  # inches
+_SWAMPS = 4.0  # times the largest explicit component, from which on a residual is cut off
 
 
 def picture_paths(
@@ -129,6 +133,8 @@ def moment_figure(
         if trial is not None:
             plot_trial(axes[-1], trial)
         share_scale(axes[:-1])
+        leave_room([axes[-1]], difference(moment, action, foil)[None])
+    leave_room(axes[: len(names)], np.stack([moment.components(name) for name in names]))
     for ax in axes:
         fade(ax, moment)
         if ax is not axes[-1]:
@@ -136,6 +142,38 @@ def moment_figure(
     figure.supylabel("expected discounted reward", fontsize=9, color=_MUTED)
     _foot(figure, moment, height)
     return figure
+
+
+def leave_room(axes: Sequence[Axes], rows: FloatArray) -> None:
+    """Cuts residuals off where the explicit components could not be seen beside them.
+
+    Args:
+        axes: with the bars of a row each, on one scale.
+        rows: `[len(axes), N+1]`.
+    """
+    residual, largest = rows[:, -1], float(np.abs(rows[:, :-1]).max(initial=0.0))
+    if largest == 0.0 or np.abs(residual).max() <= _SWAMPS * largest:
+        return
+    low = -largest * (1.5 if rows.min() < 0.0 else 0.05)
+    high = largest * (1.5 if rows.max() > 0.0 else 0.05)
+    for ax, value in zip(axes, residual, strict=True):
+        ax.set_ylim(low, high)
+        if low <= value <= high:
+            continue
+        bar = list(ax.patches)[-1]
+        box = bar.get_path().get_extents(bar.get_patch_transform())
+        up = value > 0.0
+        ax.annotate(
+            f"{'↑' if up else '↓'} {value:.4g}",
+            (0.5 * (box.x0 + box.x1), 1.0 if up else 0.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, -2 if up else 2),
+            textcoords="offset points",
+            ha="center",
+            va="top" if up else "bottom",
+            fontsize=8,
+            bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.6},
+        )
 
 
 def fade(ax: Axes, moment: Moment) -> Axes:

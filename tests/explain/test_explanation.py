@@ -1,5 +1,6 @@
 """What is found about the drone and other maps, against numbers worked out by hand."""
 
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -8,7 +9,10 @@ import pytest
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import chances, contrast, flips, forecast, rhythm
+from trdlab.explain import chances, contrast, flips, forecast, rhythm, worth
+from trdlab.explain.agents import gridworld_agent
+from trdlab.explain.copies import ModelEnvironments
+from trdlab.explain.episodes import collect
 from trdlab.explain.explanation import (
     Explanation,
     TiedActions,
@@ -17,10 +21,13 @@ from trdlab.explain.explanation import (
     explain,
 )
 from trdlab.explain.finding import Finding
+from trdlab.explain.limits import judged
 from trdlab.explain.moment import Moment, moment_of
 from trdlab.explain.tabular import gridworld_moment
+from trdlab.explain.trust.report import judge
+from trdlab.explain.trust.trusted import Trust
 from trdlab.gridworld import Gridworld, load_map, parse_map
-from trdlab.show import check, sentences
+from trdlab.show import check, explain_agent, sentences
 from trdlab.tabular import exact, learn
 
 GAMMA = 0.95
@@ -48,12 +55,12 @@ def found(kind: type[F], explanation: Explanation) -> list[F]:
 def test_the_drone_prefers_down_because_it_pays_sooner():
     explanation = explained()
     assert (explanation.action, explanation.foil) == ("down", "up")
-    (totals,) = found(contrast.EqualTotals, explanation)
+    (totals,) = found(worth.EqualTotals, explanation)
     assert totals.total == pytest.approx(4.0)
     (sooner,) = found(contrast.MoreImmediate, explanation)
     assert (sooner.leader, sooner.other, sooner.last_step) == ("down", "up", 3)
     assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
-    (better,) = found(contrast.BetterByDiscount, explanation)
+    (better,) = found(worth.BetterByDiscount, explanation)
     assert better.better_value == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4)
     assert better.worse_value == pytest.approx(4 * GAMMA**4)
     assert found(contrast.StaysAhead, explanation) == [contrast.StaysAhead("down", "up")]
@@ -143,7 +150,7 @@ def test_a_loop_has_no_total():
     explanation = explained(Gridworld(load_map("loop")))
     assert np.isnan(explanation.moment.total("right"))
     world = Gridworld(parse_map("f.S.f"))
-    assert {x.action for x in found(contrast.NoTotal, explained(world))} == {"left", "right"}
+    assert {x.action for x in found(worth.NoTotal, explained(world))} == {"left", "right"}
 
 
 def test_forecast_of_an_explicit_step_gives_the_reward_itself():
@@ -166,7 +173,7 @@ def test_what_is_not_defined_is_not_said():
     assert not found(forecast.CentreOfMass, grouped)
     assert not found(forecast.FirstStepReward, grouped)  # a group cannot be undiscounted
     assert found(forecast.FirstReward, grouped)
-    assert not found(contrast.EqualTotals, grouped)  # no totals are known without a model
+    assert not found(worth.EqualTotals, grouped)  # no totals are known without a model
 
 
 def test_crossings_are_found_at_their_step():
@@ -194,7 +201,7 @@ def test_a_learned_table_is_explained_like_an_exact_one():
     (sooner,) = found(contrast.MoreImmediate, explanation)
     assert (sooner.leader, sooner.last_step) == ("down", 3)
     assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3, abs=0.02)
-    assert not found(contrast.EqualTotals, explanation)  # samples tell no undiscounted total
+    assert not found(worth.EqualTotals, explanation)  # samples tell no undiscounted total
     assert explanation.flips == ()  # and no model can be solved again
     assert check(" ".join(sentences(explanation)), explanation)
 
@@ -223,3 +230,106 @@ def test_uncertainty_is_told_where_there_is_any():
 def test_wrong_actions_are_refused(options: dict[str, str], message: str):
     with pytest.raises(InputError, match=message.replace(".", r"\.").replace("?", r"\?")):
         explained(**options)
+
+
+def judged_moment(rows: list[list[float]], trusted: int, residual: bool, **known: Any) -> Moment:
+    told = moment(rows)
+    trust = Trust(told.time_axis, trusted, trusted, trusted, residual)
+    return replace(told, trust=trust, **known)
+
+
+def test_a_difference_that_cannot_be_trusted_is_not_discussed():
+    rows = [[0.0, 1.0, 0.0, 3.0], [0.5, 0.0, 0.0, 0.0]]  # |differences| 0.5, 1, 0, 3
+    told = explain(judged_moment(rows, 3, False), "a", "b")
+    assert [type(x) for x in told.contrast] == [worth.Better, contrast.DoubtfulDifference]
+    assert told.contrast[1] == contrast.DoubtfulDifference("a", "b", 3.0 / 4.5)
+    assert "67 % of what tells a and b apart lies at steps" in " ".join(sentences(told))
+    trusted = explain(judged_moment(rows, 3, True), "a", "b")
+    assert found(contrast.Reasons, trusted)
+    assert not found(contrast.DoubtfulDifference, trusted)
+    none = explain(replace(judged_moment(rows, 3, False), trust=None), "a", "b")
+    assert none.contrast == trusted.contrast
+
+
+def test_nothing_is_forecast_that_cannot_be_trusted():
+    rows = [[0.0, 0.0, 0.9, 0.0, 2.0, 0.0]]
+    assert explain(judged_moment(rows, 0, False), "a").forecast == ()
+    near = explain(judged_moment(rows, 2, False), "a").forecast
+    assert near == (forecast.NothingBefore("a", 2),)
+    kinds = {type(x) for x in explain(judged_moment(rows, 4, False), "a").forecast}
+    assert kinds == {forecast.FirstStepReward}  # and no peak at t+4, nor a share beyond t+5
+    (whole,) = found(forecast.FirstStepReward, explain(judged_moment(rows, 5, True), "a"))
+    assert (whole.component, whole.discounted) == (2, 0.9)
+
+
+def test_small_components_of_what_was_learned_are_no_first_reward():
+    rows = [[0.01, -0.02, 0.03, 1.0, 0.02, 0.5]]
+    (first,) = found(forecast.FirstStepReward, explain(moment(rows), "a"))
+    assert (first.component, first.effect) == (3, "notable reward")
+    exactly = replace(moment(rows), totals=np.array([2.0]))
+    firsts = found(forecast.FirstStepReward, explain(exactly, "a"))
+    assert [(x.component, x.effect) for x in firsts] == [(0, "reward"), (1, "cost")]
+
+
+@pytest.mark.parametrize(
+    ("amount", "trusted", "said"),
+    [(2.0, 4, 0.4), (0.5, 4, None), (-2.0, 4, None), (None, 4, None), (2.0, 3, None)],
+)
+def test_an_expected_reward_is_a_chance_only_where_one_reward_or_none_comes(amount, trusted, said):
+    rows = [[0.0, 0.0, 0.0, 0.8 * GAMMA**3, 0.0, 0.0]]
+    explanation = explain(judged_moment(rows, trusted, False, only_reward=amount), "a")
+    chance = [x.chance for x in found(chances.PutAt, explanation)]
+    assert chance == ([] if said is None else [pytest.approx(said)])
+
+
+def test_no_chance_is_read_from_a_group():
+    grouped = moment([[0.0, 0.8, 0.0]], width=3)
+    trust = Trust(grouped.time_axis, 2, 2, 2, residual=True)
+    explanation = explain(replace(grouped, trust=trust, only_reward=1.0), "a")
+    assert not found(chances.PutAt, explanation)
+
+
+def test_an_error_is_told_where_it_is_as_large_as_half_of_what_is_expected():
+    rows = [[0.0, 0.8, 0.0, 0.0]]
+    large = explain(judged_moment(rows, 3, True, error=np.array([0.1, 0.4, 0.1, 0.1])), "a")
+    assert found(forecast.OffBy, large) == [forecast.OffBy("a", 1, 0.4)]
+    small = explain(judged_moment(rows, 3, True, error=np.array([0.5, 0.39, 0.5, 0.5])), "a")
+    assert not found(forecast.OffBy, small)
+    unknown = explain(judged_moment(rows, 3, True, error=np.full(4, np.nan)), "a")
+    assert not found(forecast.OffBy, unknown)
+
+
+def test_a_lead_that_may_be_noise_is_not_called_sooner():
+    rows = [[0.01, 1.0, 0.0, 0.3, 0.0], [0.03, 0.0, 0.4, 0.0, 0.0]]
+    explanation = explain(moment(rows), "a", "b")
+    (sooner,) = found(contrast.MoreImmediate, explanation)
+    assert (sooner.leader, sooner.last_step) == ("a", 1)  # b leads by 0.02 at first
+    assert not found(contrast.Overtakes, explanation)
+    exactly = replace(moment(rows), totals=np.array([2.0, 1.0]))
+    assert found(contrast.MoreImmediate, explain(exactly, "a", "b"))[0].leader == "b"
+
+
+def test_a_moment_is_judged_by_a_report():
+    world = Gridworld(load_map("bridge"))
+    table = exact(world.mdp, TimeAxis(GAMMA, 6))
+    play = ModelEnvironments(world.mdp, 40, seed=0, time_limit=60)
+    report = judge(table.future, collect(table, play))
+    there = judged(gridworld_moment(world, table, 0), report)
+    assert there.trust is report.trust
+    assert there.error is not None
+    known = np.isfinite(there.error)
+    assert known.any()
+    np.testing.assert_allclose(there.error[known] ** 2, report.calibration.error.value[known])
+    reliability = report.calibration.reliability
+    assert there.only_reward == (None if reliability is None else reliability.amount)
+
+
+def test_an_exact_table_of_a_healthy_world_is_told_as_without_a_report():
+    agent = gridworld_agent("drone", TimeAxis(GAMMA, 4))
+    unjudged = explain_agent(agent, ("forecast", "contrast"), episodes=0).explanation
+    judged_too = explain_agent(agent, ("forecast", "contrast"), episodes=40).explanation
+    assert unjudged is not None
+    assert judged_too is not None
+    assert judged_too.moment.trust is not None
+    assert judged_too.contrast == unjudged.contrast
+    assert judged_too.forecast == unjudged.forecast

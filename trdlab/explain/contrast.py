@@ -1,7 +1,7 @@
 """Contrast: how two actions' futures differ."""
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 
@@ -9,6 +9,10 @@ from trdlab.arrays import FloatArray
 from trdlab.explain.finding import Finding, agrees
 from trdlab.explain.limits import doubtful
 from trdlab.explain.moment import Moment, same
+from trdlab.explain.worth import compare_totals, compare_values
+
+NOISE = 0.1
+"""A lead of what was learned may be noise up to this share of the largest one."""
 
 _MOST_DOUBT = 0.5  # of a difference, to tell what comes when
 _MOST_REASONS = 6  # components that people still look at
@@ -31,14 +35,14 @@ def contrast(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
         InputError: there is no such action, or they are the same.
     """
     moment.index(action), moment.index(foil)
-    worth = _worth(moment, action, foil)
+    worth = compare_values(moment, action, foil)
     if not difference(moment, action, foil).any():
-        return (*_totals(moment, action, foil), SameComponents(action, foil), worth)
+        return (*compare_totals(moment, action, foil), SameComponents(action, foil), worth)
     doubt = DoubtfulDifference(action, foil, doubtful_share(moment, action, foil))
     if doubt.holds(moment):
-        return (*_totals(moment, action, foil), worth, doubt)
+        return (*compare_totals(moment, action, foil), worth, doubt)
     return (
-        *_totals(moment, action, foil),
+        *compare_totals(moment, action, foil),
         *_sooner(moment, action, foil),
         worth,
         *_crossings(moment, action, foil),
@@ -46,28 +50,14 @@ def contrast(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     )
 
 
-def _totals(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
-    if moment.totals is None:
-        return ()
-    a, b = moment.total(action), moment.total(foil)
-    endless = tuple(NoTotal(name) for name, x in ((action, a), (foil, b)) if np.isnan(x))
-    if endless:
-        return endless
-    if EqualTotals(action, foil, a).holds(moment):
-        return (EqualTotals(action, foil, a),)
-    if a > b:
-        return (DifferentTotals(action, foil, a, b),)
-    return (DifferentTotals(foil, action, b, a),)
-
-
 def _sooner(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     horizon, width = moment.time_axis.horizon, moment.time_axis.width
-    lead = running_lead(moment, action, foil)[:horizon]
+    lead = clear_lead(moment, action, foil)
     if not lead.any():
         return ()
     first = int(np.flatnonzero(lead)[0])
     leader, other = (action, foil) if lead[first] > 0 else (foil, action)
-    lead = running_lead(moment, leader, other)[:horizon]
+    lead = clear_lead(moment, leader, other)
     lost = np.flatnonzero(lead[first:] <= 0)
     until = first + int(lost[0]) if lost.size else horizon
     count = int(lead[:until].argmax()) + 1  # where the leader is furthest ahead
@@ -76,24 +66,18 @@ def _sooner(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     return (kind(leader, other, sums[0], sums[1], count * width - 1),)
 
 
-def _worth(moment: Moment, action: str, foil: str) -> Finding:
-    gamma, a, b = moment.time_axis.gamma, moment.q_value(action), moment.q_value(foil)
-    if same(a, b):
-        return EqualValues(action, foil, gamma, a)
-    claim = (*moment.ordered(action, foil), gamma, max(a, b), min(a, b))
-    by_discount = BetterByDiscount(*claim)
-    return by_discount if by_discount.holds(moment) else Better(*claim)
-
-
 def _crossings(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     lead = running_lead(moment, action, foil)
-    ahead = [(i, lead[i] > 0) for i in np.flatnonzero(lead)]
+    runs = [list(run) for _, run in groupby(np.flatnonzero(lead), key=lambda i: lead[i] > 0)]
+    least = _noise(moment, lead)
+    clear = [run for run in runs if np.abs(lead[run]).max() >= least]
     found: list[Finding] = []
-    for (_, before), (i, now) in pairwise(ahead):
-        if before != now:
-            leader, other = (action, foil) if now else (foil, action)
+    for before, now in pairwise(clear):
+        i, is_ahead = int(now[0]), bool(lead[now[0]] > 0)
+        if is_ahead != (lead[before[0]] > 0):
+            leader, other = (action, foil) if is_ahead else (foil, action)
             sums = [float(moment.components(name)[: i + 1].sum()) for name in (leader, other)]
-            found.append(Overtakes(leader, other, int(i), sums[0], sums[1]))
+            found.append(Overtakes(leader, other, i, sums[0], sums[1]))
     never = [StaysAhead(action, foil), StaysAhead(foil, action)]
     told = found if len(found) <= _MOST_CROSSINGS else found[-1:]
     return tuple(told) or tuple(finding for finding in never if finding.holds(moment))
@@ -118,45 +102,6 @@ def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     if len(chosen) > _MOST_REASONS:
         return ()
     return (Reasons(better, worse, tuple(sorted(chosen)), advantage, against),)
-
-
-@dataclass(eq=False, repr=False)
-class EqualTotals(Finding):
-    """Both actions pay the same in total, undiscounted."""
-
-    action: str
-    foil: str
-    total: float
-
-    def holds(self, moment: Moment) -> bool:
-        a, b = moment.total(self.action), moment.total(self.foil)
-        return _close(a, b) and agrees(self.total, a)
-
-
-@dataclass(eq=False, repr=False)
-class DifferentTotals(Finding):
-    """One action pays more in total, undiscounted."""
-
-    more: str
-    less: str
-    more_total: float
-    less_total: float
-
-    def holds(self, moment: Moment) -> bool:
-        a, b = moment.total(self.more), moment.total(self.less)
-        return (
-            a > b and not _close(a, b) and agrees(self.more_total, a) and agrees(self.less_total, b)
-        )
-
-
-@dataclass(eq=False, repr=False)
-class NoTotal(Finding):
-    """An action has no undiscounted total: its rewards never end."""
-
-    action: str
-
-    def holds(self, moment: Moment) -> bool:
-        return moment.totals is not None and bool(np.isnan(moment.total(self.action)))
 
 
 @dataclass(eq=False, repr=False)
@@ -185,7 +130,7 @@ class DoubtfulDifference(Finding):
 
 @dataclass(eq=False, repr=False)
 class MoreImmediate(Finding):
-    """One action's running total leads from the first difference on, furthest at `last_step`."""
+    """One running total is the first to lead clearly, and furthest ahead at `last_step`."""
 
     leader: str
     other: str
@@ -201,7 +146,7 @@ class MoreImmediate(Finding):
         count = self._count(moment)
         if self.last_step != count * axis.width - 1 or not 0 < count <= axis.horizon:
             return False
-        lead = running_lead(moment, self.leader, self.other)[: axis.horizon]
+        lead = clear_lead(moment, self.leader, self.other)
         first = int((lead != 0).argmax())
         lost = int((lead[first:] <= 0).argmax()) or axis.horizon  # counted from the first lead on
         other = moment.components(self.other)[:count].sum()
@@ -225,49 +170,6 @@ class LessCostly(MoreImmediate):
 
     def holds(self, moment: Moment) -> bool:
         return self._leads(moment) and self._leader_total(moment) <= 0.0
-
-
-@dataclass(eq=False, repr=False)
-class Better(Finding):
-    """One action has the larger Q-value."""
-
-    better: str
-    worse: str
-    gamma: float
-    better_value: float
-    worse_value: float
-
-    def holds(self, moment: Moment) -> bool:
-        a, b = moment.q_value(self.better), moment.q_value(self.worse)
-        return (
-            a > b
-            and not same(a, b)
-            and agrees(self.gamma, moment.time_axis.gamma)
-            and agrees(self.better_value, a)
-            and agrees(self.worse_value, b)
-        )
-
-
-@dataclass(eq=False, repr=False)
-class BetterByDiscount(Better):
-    """The same where the undiscounted totals are equal: only the discount decides."""
-
-    def holds(self, moment: Moment) -> bool:
-        return _close(moment.total(self.better), moment.total(self.worse)) and super().holds(moment)
-
-
-@dataclass(eq=False, repr=False)
-class EqualValues(Finding):
-    """Both actions have the same Q-value."""
-
-    action: str
-    foil: str
-    gamma: float
-    value: float
-
-    def holds(self, moment: Moment) -> bool:
-        a, b = moment.q_value(self.action), moment.q_value(self.foil)
-        return same(a, b) and agrees(self.value, a) and agrees(self.gamma, moment.time_axis.gamma)
 
 
 @dataclass(eq=False, repr=False)
@@ -367,5 +269,12 @@ def running_lead(moment: Moment, action: str, foil: str) -> FloatArray:
     return np.where(equal, 0.0, lead)
 
 
-def _close(a: float, b: float) -> bool:
-    return abs(a - b) <= 1e-9 * max(1.0, abs(a), abs(b))
+def clear_lead(moment: Moment, action: str, foil: str) -> FloatArray:
+    """Returns `[N]`: the running lead, 0 where it may be noise (see `NOISE`)."""
+    lead = running_lead(moment, action, foil)[:-1]
+    return np.where(np.abs(lead) >= _noise(moment, lead), lead, 0.0)
+
+
+def _noise(moment: Moment, lead: FloatArray) -> float:
+    """Returns how large a lead can be and still be noise."""
+    return 0.0 if moment.is_exact else NOISE * float(np.abs(lead).max(initial=0.0))

@@ -38,9 +38,10 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
         return (*_nothing(moment, action), *chances(moment, action))
     always = steady(moment, action)
     return (
-        *(_when(moment, action) if always is None else [always]),
+        *([always] if always is not None else _when(moment, action)),
         *_accuracy(moment, action),
-        *_whole(moment, action),
+        *_beyond(moment, action),
+        *(_centre(moment, action) if always is None else ()),
         *chances(moment, action),
     )
 
@@ -90,31 +91,42 @@ def _accuracy(moment: Moment, action: str) -> Iterator[Finding]:
             yield OffBy(action, i, error)
 
 
-def _whole(moment: Moment, action: str) -> Iterator[Finding]:
-    """Yields what is said of all components together."""
-    row, end = moment.components(action), explicit_end(moment)
-    explicit = row[:end]
-    if one_sign(explicit) and np.count_nonzero(explicit) > 1 and moment.time_axis.width == 1:
-        yield CentreOfMass(action, end, float(explicit @ np.arange(end) / explicit.sum()))
+def _speaks_of_all(moment: Moment) -> bool:
+    """Returns whether all components can be told of: they are trusted, or of an exact table.
+
+    Short episodes of such a table may not have shown what it knows of the residual.
+    """
+    return moment.is_exact or not doubtful(moment).any()
+
+
+def _beyond(moment: Moment, action: str) -> Iterator[Finding]:
+    row = moment.components(action)
     if one_sign(row):
         beyond = ShareBeyond(action, float(row[-1] / row.sum()), moment.time_axis.horizon)
         if beyond.share >= _TOO_LITTLE and beyond.holds(moment):
             yield beyond
 
 
+def _centre(moment: Moment, action: str) -> Iterator[Finding]:
+    end = explicit_end(moment)
+    explicit = moment.components(action)[:end]
+    if one_sign(explicit) and np.count_nonzero(explicit) > 1 and moment.time_axis.width == 1:
+        yield CentreOfMass(action, end, float(explicit @ np.arange(end) / explicit.sum()))
+
+
 @dataclass(eq=False, repr=False)
 class EarnsNothing(Finding):
-    """No component of an action differs from zero, and all are trusted."""
+    """No component of an action differs from zero (see `_speaks_of_all`)."""
 
     action: str
 
     def holds(self, moment: Moment) -> bool:
-        return not moment.components(self.action).any() and not doubtful(moment).any()
+        return not moment.components(self.action).any() and _speaks_of_all(moment)
 
 
 @dataclass(eq=False, repr=False)
 class AllBeyond(Finding):
-    """All of an action's value lies in the residual, and every component is trusted."""
+    """All of an action's value lies in the residual (see `_speaks_of_all`)."""
 
     action: str
     value: float
@@ -122,7 +134,7 @@ class AllBeyond(Finding):
 
     def holds(self, moment: Moment) -> bool:
         row = moment.components(self.action)
-        at_end = self.component == moment.time_axis.horizon > 0 and not doubtful(moment).any()
+        at_end = self.component == moment.time_axis.horizon > 0 and _speaks_of_all(moment)
         return at_end and not row[:-1].any() and row[-1] != 0.0 and agrees(self.value, row[-1])
 
 
@@ -207,9 +219,9 @@ class CentreOfMass(Finding):
 
 @dataclass(eq=False, repr=False)
 class ShareBeyond(Finding):
-    """The share of an action's value that lies in the residual.
+    """The share of an action's value that lies in the residual; components of one sign only.
 
-    All components have one sign, and all are trusted.
+    For what has to be trusted, see `_speaks_of_all`.
     """
 
     action: str
@@ -222,6 +234,6 @@ class ShareBeyond(Finding):
             self.component == moment.time_axis.horizon > 0
             and one_sign(row)
             and row[-1] != 0.0
-            and not doubtful(moment).any()
+            and _speaks_of_all(moment)
             and agrees(self.share, float(row[-1] / row.sum()))
         )

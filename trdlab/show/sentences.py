@@ -1,6 +1,15 @@
 """Findings about a moment as English sentences, and sentences read back into findings."""
 
-from trdlab.explain import chances, contrast, explanation, flips, forecast, limits, rhythm
+from trdlab.explain import (
+    chances,
+    contrast,
+    explanation,
+    flips,
+    forecast,
+    limits,
+    rhythm,
+    worth,
+)
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.finding import Claim, Finding
 from trdlab.show.templates import Form, Language, UnsupportedSentenceError, forms_of
@@ -8,11 +17,11 @@ from trdlab.show.templates import Form, Language, UnsupportedSentenceError, form
 __all__ = ["TEMPLATES", "UnsupportedSentenceError", "check", "sentence", "sentences"]
 
 TEMPLATES: dict[type[Claim], str] = {
-    contrast.EqualTotals: "Both routes pay {total:amount} in total.",
-    contrast.DifferentTotals: (
+    worth.EqualTotals: "Both routes pay {total:amount} in total.",
+    worth.DifferentTotals: (
         "In total {more} pays {more_total:amount} and {less} {less_total:amount}."
     ),
-    contrast.NoTotal: "{action} has no undiscounted total, for its rewards may never end.",
+    worth.NoTotal: "{action} has no undiscounted total, for its rewards may never end.",
     contrast.MoreImmediate: (
         "{leader} gives more immediate rewards than {other}: by {last_step:step} they are worth "
         "{leader_sum:value} against {other_sum:value}."
@@ -26,17 +35,15 @@ TEMPLATES: dict[type[Claim], str] = {
         "{share:percent} of what tells {action} and {foil} apart lies at steps where such "
         "forecasts have not proved better than a guess."
     ),
-    contrast.BetterByDiscount: (
+    worth.BetterByDiscount: (
         "Only the discount tells them apart: with γ = {gamma:plain} {better} is worth "
         "{better_value:value} and {worse} {worse_value:value}."
     ),
-    contrast.Better: (
+    worth.Better: (
         "With γ = {gamma:plain} {better} is worth {better_value:value} and {worse} "
         "{worse_value:value}."
     ),
-    contrast.EqualValues: (
-        "With γ = {gamma:plain} {action} and {foil} are both worth {value:value}."
-    ),
+    worth.EqualValues: ("With γ = {gamma:plain} {action} and {foil} are both worth {value:value}."),
     contrast.Overtakes: (
         "Counted as they come in, the rewards of {leader} overtake those of {other} at "
         "{component:when}: {leader_total:value} against {other_total:value}."

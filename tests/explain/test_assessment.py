@@ -15,6 +15,7 @@ from trdlab.explain import (
     CopyableGymEnvironments,
     Copying,
     assess,
+    collect,
     explain,
     gridworld_agent,
 )
@@ -122,6 +123,19 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
     agent = Agent("once", drone.estimator, ("wait", "take"), make)
     report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
     assert (report.ceiling is not None) == copyable
+
+
+def test_a_step_is_of_the_episode_that_the_story_tells():
+    agent = gridworld_agent("ledge", AXIS)
+    uniform = replace(agent, policy=lambda states: np.full((len(states), 4), 0.25))
+    for seed in range(5):
+        environments = uniform.make(1, seed)
+        (episode,) = collect(agent.estimator, environments, policy=uniform.policy, seed=seed)
+        for step in range(len(episode)):
+            moment = uniform.moment(seed=seed, step=step)
+            np.testing.assert_array_equal(
+                moment.decomposition.components, episode.decomposition[step].components
+            )
 
 
 def test_an_agent_needs_an_episode_to_be_judged_by():

@@ -150,7 +150,8 @@ def collect(
         counting: which rewards it counts, and what ends its future.
         epsilon: the chance of a random action instead. Random actions lead to more states; what
             follows one is not held against what was predicted before it.
-        seed: of the actions.
+        seed: of the actions; those of the policy are drawn as `play_to` draws them, so that with
+            ε = 0 a lone episode is the same there.
         on_episode: called with the number of finished episodes whenever some finish.
 
     Returns:
@@ -161,7 +162,8 @@ def collect(
     """
     if not 0.0 <= epsilon < 1.0:
         raise InputError(f"ε is {epsilon}.", "It must be at least 0 and less than 1.")
-    rng, count = np.random.default_rng(seed), environments.num_envs
+    rng, chance = np.random.default_rng(seed), np.random.default_rng([seed, 1])
+    count = environments.num_envs
     logs: list[list[tuple[Any, ...]]] = [[] for _ in range(count)]
     last, terminated = [np.zeros(0)] * count, np.zeros(count, dtype=np.bool_)
     stack = FrameStack(environments.reset(), environments.stack, environments.padding)
@@ -170,8 +172,8 @@ def collect(
         decision = decide(estimator, stack.observations[running], policy)
         actions = np.zeros(count, dtype=np.int64)
         actions[running] = decision.draw(rng)
-        random = running & (rng.random(count) < epsilon)
-        actions[random] = rng.integers(environments.num_actions, size=int(random.sum()))
+        random = running & (chance.random(count) < epsilon)
+        actions[random] = chance.integers(environments.num_actions, size=int(random.sum()))
         step = environments.step(actions)
         happened = (actions, counting.count(step.rewards), step.life_lost, counting.ends(step))
         seen = zip(decision.decomposition.components, decision.expected, strict=True)
@@ -187,7 +189,7 @@ def collect(
         running &= ~step.ended
         if finish.any():
             on_episode(int(count - running.sum()))
-    coins = rng.random((count, estimator.time_axis.num_steps)) < epsilon  # [E, N·w]
+    coins = chance.random((count, estimator.time_axis.num_steps)) < epsilon  # [E, N·w]
     return tuple(
         _episode(
             log,

@@ -170,7 +170,7 @@ def test_a_run_in_another_environment(trdlab, trained):
         (["--action", "up", "--foil", "0"], "Action and foil are both 'up'."),
         (["--what", "contrst"], "There is no explanation 'contrst'. Did you mean 'contrast'?"),
         (["--what", "calibration", "--episodes", "0"], "A calibration needs episodes."),
-        (["--env", "CartPole-v1"], "'CartPole-v1' is no exact model"),
+        (["--env", "CartPole-v1"], "'CartPole-v1' does not fit the agent: it has 4 float32"),
         (["--env-arg", "slip=0.2"], "Write gridworld:drone,slip=0.2"),
         (["--N", "-1"], "horizon N"),
     ],

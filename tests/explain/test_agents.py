@@ -105,6 +105,24 @@ def test_a_run_acts_in_its_own_environment_or_in_one_that_is_named(trained):
     assert abroad.words == (str(trained), "--env", "FrozenLake-v1")
 
 
+def test_a_run_acts_in_an_exact_model_and_a_table_in_an_environment(trained):
+    model = "tabular:FrozenLake-v1,is_slippery=false"
+    run = find_agent(str(trained), env=model)
+    assert isinstance(run.make(1, 0), ModelEnvironments)
+    assert run.words == (str(trained), "--env", model)
+    place = {"env": "FrozenLake-v1", "env_arguments": ["is_slippery=false"]}
+    table = find_agent(model, time_axis=TimeAxis(0.9, 6), **place)
+    assert (
+        table.words[-4:]
+        == table.place
+        == ("--env", "FrozenLake-v1", "--env-arg", "is_slippery=false")
+    )
+    moment = table.moment(step=5)  # at the goal's side
+    assert moment.components("right")[0] == 1.0
+    with pytest.raises(InputError, match="does not fit the agent: its observations are 14 states"):
+        find_agent(str(trained), env="gridworld:drone")
+
+
 def test_a_checkpoint_is_named_by_its_step(trained):
     old, new, newest = (find_agent(f"{trained}{at}") for at in ("@400", "@600", ""))
     assert old.name == "lake@400"
@@ -131,7 +149,14 @@ def test_a_checkpoint_is_named_by_its_step(trained):
         ("gridworld:drone,exploring_starts=2", {}, "It must be true or false"),
         ("gridworld:drone", {"env_arguments": ["slip=1"]}, "Write gridworld:drone,slip=1"),
         ("gridworld:drone", {"env": "gridworld:ledge"}, "'gridworld:ledge' does not fit the agent"),
-        ("gridworld:drone", {"env": "CartPole-v1"}, "'CartPole-v1' is no exact model"),
+        ("gridworld:drone", {"env": "CartPole-v1"}, "does not fit the agent: it has 4 float32"),
+        ("gridworld:drone", {"env": "CartPol-v1"}, "Did you mean 'CartPole-v1'"),
+        (
+            "gridworld:drone",
+            {"env": "gridworld:drone", "env_arguments": ["slip=1"]},
+            "drone,slip=1",
+        ),
+        ("tabular:FrozenLake-v1", {"env": "gridworld:bridge"}, "does not fit the agent"),
         ("tabular:FrozenLak-v1", {}, "Did you mean 'FrozenLake-v1'"),
         ("tabular:FrozenLake-v1,slippery=1", {}, "Did you mean 'is_slippery'"),
         ("tabular:CartPole-v1", {}, "CartPole-v1 has no transition table"),

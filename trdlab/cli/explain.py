@@ -51,9 +51,7 @@ def explain(
     ] = None,
     env_arguments: Annotated[
         list[str] | None,
-        typer.Option(
-            "--env-arg", metavar="KEY=VALUE", help="What to make the --env of a run with."
-        ),
+        typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
     ] = None,
     gamma: Annotated[
         float | None,

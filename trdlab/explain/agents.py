@@ -1,6 +1,6 @@
 """The agent that is explained: an estimator, the policy it describes, and where it acts."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,10 +9,8 @@ import numpy as np
 
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
-from trdlab.environments.arguments import parse_arguments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.explain.copies import CopyableGymEnvironments
 from trdlab.explain.counterfactual import play_to
 from trdlab.explain.episodes import AS_PAID, Counting, Policy, decide
 from trdlab.explain.models import (
@@ -23,10 +21,10 @@ from trdlab.explain.models import (
     exact_moment,
     gridworld_model,
     is_model,
-    other_model,
     tabular_model,
 )
 from trdlab.explain.moment import Moment, moment_of
+from trdlab.explain.places import Make, Place, check_fits, find_place, refuse_arguments
 from trdlab.gridworld import map_names
 from trdlab.runs.checkpoint import checkpoint_steps
 from trdlab.runs.folder import RunFolder
@@ -40,9 +38,6 @@ AXIS = TimeAxis(0.95, 4)
 """Of an exact table, where nothing is said."""
 
 _DIGITS = 19  # more are no number of steps
-
-Make = Callable[[int, int], Environments]
-"""From the number of environments and their seed to the environments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,51 +99,73 @@ class Agent:
         return replace(moment, policy=policy, seconds_per_step=self.seconds_per_step)
 
 
-def gridworld_agent(map_name: str, time_axis: TimeAxis, *, env: str | None = None) -> Agent:
+def gridworld_agent(
+    map_name: str,
+    time_axis: TimeAxis,
+    *,
+    env: str | None = None,
+    env_arguments: Sequence[str] = (),
+) -> Agent:
     """Returns the exact table of a gridworld as an agent that acts optimally in it.
 
     Args:
         map_name: a built-in map, or a file, and after commas what to make it with, such as
             `ledge,slip=0.2`; `gridworld:` may stand before it.
         time_axis: γ, N and w.
-        env: another exact model to act in instead, with the same states.
+        env: an environment to act in instead, with the same states (see `find_place`).
+        env_arguments: what to make that one with.
 
     Raises:
-        InputError: a map cannot be read, or the other model does not fit.
+        InputError: a map cannot be read, or the other environment does not fit.
     """
     called = GRIDWORLD + map_name.removeprefix(GRIDWORLD)
-    return _exact_agent(called, gridworld_model(map_name), time_axis, env)
+    return _exact_agent(called, gridworld_model(map_name), time_axis, env, env_arguments)
 
 
-def tabular_agent(env_id: str, time_axis: TimeAxis, *, env: str | None = None) -> Agent:
+def tabular_agent(
+    env_id: str,
+    time_axis: TimeAxis,
+    *,
+    env: str | None = None,
+    env_arguments: Sequence[str] = (),
+) -> Agent:
     """Returns the exact table of an environment's model as an agent that acts optimally in it.
 
     Args:
         env_id: a Gymnasium environment with a transition table, and after commas what to make it
             with, such as `FrozenLake-v1,is_slippery=false`; `tabular:` may stand before it.
         time_axis: γ, N and w.
-        env: another exact model to act in instead, with the same states.
+        env: an environment to act in instead, with the same states (see `find_place`).
+        env_arguments: what to make that one with.
 
     Raises:
         InputError: there is no such environment, it has no table, or the other one does not fit.
     """
     called = TABULAR + env_id.removeprefix(TABULAR)
-    return _exact_agent(called, tabular_model(env_id), time_axis, env)
+    return _exact_agent(called, tabular_model(env_id), time_axis, env, env_arguments)
 
 
-def _exact_agent(called: str, model: Model, time_axis: TimeAxis, env: str | None) -> Agent:
-    there = model if env is None else other_model(env, model.world)
+def _exact_agent(
+    called: str, model: Model, time_axis: TimeAxis, env: str | None, env_arguments: Sequence[str]
+) -> Agent:
+    place = Place(
+        lambda num_envs, seed: model.environments(num_envs, seed, time_axis), ("--env", called)
+    )
+    if env is not None:
+        place = find_place(env, env_arguments, time_axis)
+        check_fits(place, model.world)
+    else:
+        refuse_arguments(called, env_arguments)
     table = exact(model.world.mdp, time_axis)
-    place = ("--env", called if env is None else env)
     return Agent(
         name=model.name,
         estimator=table,
         action_names=model.world.action_names,
-        make=lambda num_envs, seed: there.environments(num_envs, seed, time_axis),
+        make=place.make,
         policy=lambda states: table.solution.policy[states],
         world=model.world,
-        words=(called, *_axis_words(time_axis), *(() if env is None else place)),
-        place=place,
+        words=(called, *_axis_words(time_axis), *(() if env is None else place.words)),
+        place=place.words,
     )
 
 
@@ -172,8 +189,8 @@ def run_agent(
     Args:
         path: the run's folder.
         step: of an older checkpoint, in agent steps.
-        env: another environment to act in, of the same kind.
-        env_arguments: what to make the other one with, as `KEY=VALUE`.
+        env: another environment to act in (see `find_place`).
+        env_arguments: what to make that one with, as `KEY=VALUE`.
 
     Raises:
         InputError: there is no run or no such checkpoint, or the environment does not fit.
@@ -185,46 +202,41 @@ def run_agent(
 
     folder = RunFolder.open(path)
     settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
-    if env is not None:
-        settings = replace(settings, env=env, env_arg=tuple(env_arguments))
-    elif env_arguments:
+    if env_arguments and env is None:
         raise InputError("The run says what its environment is made with.", "Give --env too.")
     use_threads(settings)
     estimator = load(path, step)
-
-    def make(num_envs: int, seed: int) -> Environments:
-        return _environments(settings, num_envs, seed)
-
-    environments = make(1, 0)
+    place = _place(settings, env, env_arguments)
+    environments = place.make(1, 0)
     try:
-        told = _fitting(environments, folder.manifest["environment"], settings.env)
+        told = _fitting(environments, folder.manifest["environment"], place.words[1])
     finally:
         environments.close()
     names = tuple(told["action_names"])
     at = "" if step is None else f"@{step}"
     per_second = told["frames_per_second"]
-    given = (word for argument in settings.env_arg for word in ("--env-arg", argument))
-    place = ("--env", settings.env, *given)
     return Agent(
         name=f"{folder.path.name}{at}",
         estimator=estimator,
         action_names=names or tuple(f"action {i}" for i in range(told["num_actions"])),
-        make=make,
+        make=place.make,
         counting=Counting(settings.clip_rewards, settings.life_loss_ends),
         seconds_per_step=told["frame_skip"] / per_second if per_second else None,
-        words=(f"{path}{at}", *(() if env is None else place)),
-        place=place,
+        words=(f"{path}{at}", *(() if env is None else place.words)),
+        place=place.words,
     )
 
 
-def _environments(settings: "TrainSettings", num_envs: int, seed: int) -> Environments:
-    """Returns the environments of a run, such that their states can be copied where possible."""
+def _place(settings: "TrainSettings", env: str | None, env_arguments: Sequence[str]) -> Place:
+    """Returns where the agent of a run acts: where it was trained, or in another environment."""
     from trdlab.training.setup import make_environments
 
-    if settings.kind == "atari":
-        return make_environments(settings, num_envs=num_envs, seed=seed)
-    arguments = parse_arguments(settings.env_arg)
-    return CopyableGymEnvironments(settings.env, num_envs, seed=seed, env_arguments=arguments)
+    own = (settings.env, settings.env_arg) if env is None else (env, tuple(env_arguments))
+    place = find_place(*own, settings.time_axis)
+    if settings.kind != "atari" or is_model(own[0]):
+        return place
+    there = replace(settings, env=own[0], env_arg=own[1])
+    return Place(lambda num, seed: make_environments(there, num_envs=num, seed=seed), place.words)
 
 
 def _fitting(
@@ -269,21 +281,16 @@ def find_agent(
     Args:
         name: of the agent.
         time_axis: of an exact table, by default γ = 0.95, N = 4, w = 1; a run has its own.
-        env: an environment to act in instead of its own.
-        env_arguments: what to make the other environment of a run with.
+        env: an environment to act in instead of its own (see `find_place`).
+        env_arguments: what to make that one with, as `KEY=VALUE`.
 
     Raises:
         InputError: there is no such agent, or something does not fit it.
         TrdlabError: a run is torn.
     """
     if is_model(name):
-        if env_arguments:
-            raise InputError(
-                f"--env-arg is for runs, and '{name}' is an exact table.",
-                f"Write {name},{','.join(env_arguments)}",
-            )
         of = tabular_agent if name.startswith(TABULAR) else gridworld_agent
-        return of(name, time_axis or AXIS, env=env)
+        return of(name, time_axis or AXIS, env=env, env_arguments=env_arguments)
     _refuse_model(name)
     if time_axis is not None:
         raise InputError("A run has its own γ, N and w.", "Leave out --gamma, --N and --w.")

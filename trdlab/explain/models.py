@@ -130,29 +130,13 @@ def tabular_model(text: str) -> Model:
     )
 
 
-def other_model(env: str, own: World) -> Model:
-    """Returns the model that is named, if it has the same states and actions as another one.
-
-    Args:
-        env: how it is named.
-        own: the other one.
+def find_model(name: str) -> Model:
+    """Returns the model of a name, for which `is_model` is true.
 
     Raises:
-        InputError: it is none, or it does not fit.
+        InputError: it cannot be made.
     """
-    if not is_model(env):
-        raise InputError(
-            f"'{env}' is no exact model, and the agent is the exact table of one.",
-            f"Give {GRIDWORLD}NAME, {TABULAR}ENV_ID or a map file, its arguments after commas.",
-        )
-    other = tabular_model(env) if env.startswith(TABULAR) else gridworld_model(env)
-    if _what_fits(other.world) != _what_fits(own):
-        raise InputError(
-            f"'{env}' does not fit the agent: it has {_what_fits(other.world)}, and the agent "
-            f"knows {_what_fits(own)}.",
-            "Give a model with the same ones, such as the same one with another slip.",
-        )
-    return other
+    return tabular_model(name) if name.startswith(TABULAR) else gridworld_model(name)
 
 
 def exact_moment(world: World, table: ExactTable, state: int) -> Moment:
@@ -180,7 +164,3 @@ def _apart(text: str) -> tuple[str, dict[str, Any]]:
 
 def _together(name: str, arguments: Mapping[str, Any]) -> str:
     return ",".join([name, *(say_arguments({key: arguments[key]}) for key in arguments)])
-
-
-def _what_fits(world: World) -> str:
-    return f"{world.mdp.num_states} states and the actions {', '.join(world.action_names)}"

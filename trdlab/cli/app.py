@@ -13,6 +13,7 @@ COMMANDS = {
     "gridworld": "trdlab.cli.gridworld",
     "tabular": "trdlab.cli.tabular",
     "explain": "trdlab.cli.explain",
+    "compare": "trdlab.cli.compare",
     "train": "trdlab.cli.train",
     "resume": "trdlab.cli.train",
     "evaluate": "trdlab.cli.train",

@@ -1,0 +1,162 @@
+"""`trdlab compare` as its users see it."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from trdlab.cli import main
+from trdlab.deep.settings import TrainSettings
+from trdlab.training.run import begin, carry_on
+
+Outcome = tuple[int, str, str]
+Trdlab = Callable[..., Outcome]
+TABLES = ("gridworld:ledge", "gridworld:ledge,slip=0.3")
+
+
+@pytest.fixture
+def trdlab(capsys, monkeypatch, tmp_path) -> Trdlab:
+    """Returns a function that runs `trdlab`: exit code, stdout, stderr."""
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: object) -> Outcome:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main([*map(str, words)])
+        out, err = capsys.readouterr()
+        return int(end.value.code or 0), out, err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory) -> Path:
+    """Returns a run with two checkpoints; not to be changed."""
+    out = tmp_path_factory.mktemp("runs") / "drone"
+    lines: dict[str, Any] = {
+        "agent_steps": 1000,
+        "learning_starts": 100,
+        "checkpoint_every": 500,
+        "gamma": 0.9,
+        "N": 6,
+        "hidden": [16],
+        "env_arg": ["slip=0.2"],
+    }
+    threads = torch.get_num_threads()
+    settings = TrainSettings("gym", "trdlab/DroneGridworld-v0").changed(lines)
+    with begin(settings, out) as run:
+        carry_on(run)
+    torch.set_num_threads(threads)
+    return out
+
+
+def test_two_tables_are_compared_and_a_picture_is_drawn(trdlab, tmp_path):
+    code, out, err = trdlab("compare", *TABLES, "--episodes", 20)
+    assert code == 0
+    assert out.startswith("A: ledge · B: ledge,slip=0.3")
+    assert "both act in gridworld:ledge" in out
+    assert "A expects more in all than B" in out
+    assert "They were compared at" in out
+    folder = Path("explanations") / "ledge-against-ledge,slip=0.3"
+    assert err == f"Picture: {folder / 'comparison.png'}\n"
+    assert (folder / "comparison.png").read_bytes().startswith(b"\x89PNG")
+    trdlab("compare", *TABLES, "--episodes", 2)
+    assert Path(f"{folder}-2").is_dir()
+
+
+def test_the_commands_that_are_printed_run(trdlab):
+    _, out, _ = trdlab("compare", *TABLES, "--episodes", 5, "--gamma", 0.9, "--N", 3, "--out", "x")
+    commands = [line.split()[1:] for line in out.splitlines() if "trdlab explain" in line]
+    assert len(commands) == 3
+    for words in commands:
+        code, shown, _ = trdlab(*words, "--what", "forecast", "--episodes", 0)
+        assert code == 0
+        assert "γ = 0.9, N = 3, w = 1" in shown
+
+
+def test_checkpoints_of_a_run(trdlab, trained):
+    code, out, _ = trdlab("compare", f"{trained}@500", trained, "--episodes", 10, "--json")
+    data = json.loads(out)
+    assert code == 0
+    assert [data["agents"][side]["name"] for side in "AB"] == ["drone@500", "drone"]
+    assert data["place"] == ["--env", "trdlab/DroneGridworld-v0", "--env-arg", "slip=0.2"]
+    assert max(data["apart"]["value"]) > 0.0
+    assert not Path("explanations").exists()
+    _, again, _ = trdlab("compare", f"{trained}@500", trained, "--episodes", 10, "--json")
+    assert again == out
+    _, out, _ = trdlab("compare", f"{trained}@1000", trained, "--episodes", 10, "--json")
+    assert json.loads(out)["findings"][0]["kind"] == "nothing-differs"
+
+
+def test_a_run_beside_the_exact_table_that_takes_its_axis(trdlab, trained):
+    table = "gridworld:drone,slip=0.2"
+    code, out, _ = trdlab("compare", table, trained, "--episodes", 10, "--out", "pictures")
+    assert code == 0
+    assert "γ = 0.9, N = 6, w = 1 · both act in gridworld:drone,slip=0.2" in out
+    assert "B tells of the future of the greedy policy of the network" in out
+    words = next(line for line in out.splitlines() if "trdlab explain" in line).split()
+    assert trdlab(*words[1:], "--what", "forecast", "--episodes", 0)[0] == 0
+
+
+def test_elsewhere(trdlab, trained):
+    same = ("--env", "trdlab/DroneGridworld-v0", "--env-arg", "slip=0.9")
+    code, out, _ = trdlab("compare", f"{trained}@500", trained, *same, "--episodes", 3, "--json")
+    assert code == 0
+    assert json.loads(out)["place"] == list(same)
+    code, out, _ = trdlab(
+        "compare", *TABLES, "--env", "gridworld:ledge,slip=0.6", "--episodes", 3, "--out", "x"
+    )
+    assert code == 0
+    assert "both act in gridworld:ledge,slip=0.6" in out
+    assert "--env gridworld:ledge,slip=0.6 --seed" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["gridworld:ledge", "gridworld:ledg"], "There is no map 'ledg'. Did you mean 'ledge'?"),
+        (["gridworld:ledge", "gridworld:drone"], "they see 8 states and 14 states"),
+        (["gridworld:ledge", "runs/none"], "There is no 'runs/none'"),
+        (["gridworld:ledge"], "Missing argument 'B'"),
+        ([*TABLES, "--env", "gridworld:drone"], "'gridworld:drone' does not fit the agent"),
+        ([*TABLES, "--env-arg", "slip=1"], "Write gridworld:ledge,slip=1"),
+        ([*TABLES, "--episodes", "0"], "0 is not in the range"),
+        ([*TABLES, "--gamma", "1.5"], "The discount factor gamma is 1.5"),
+        ([*TABLES, "--out", "taken"], "The picture 'taken/comparison.png' exists."),
+        ([*TABLES, "--out", "taken/comparison.png"], "is a file"),
+    ],
+)
+def test_refusals_are_one_clear_line(trdlab, words, message):
+    Path("taken").mkdir()
+    Path("taken/comparison.png").write_text("mine", encoding="utf-8")
+    code, out, err = trdlab("compare", *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert Path("taken/comparison.png").read_text(encoding="utf-8") == "mine"
+    assert not Path("explanations").exists()
+
+
+def test_runs_have_their_own_axis_and_observations(trdlab, trained):
+    code, _, err = trdlab("compare", trained, trained, "--gamma", 0.9)
+    assert (code, "Runs have their own γ, N and w." in err) == (2, True)
+    code, _, err = trdlab("compare", trained, "gridworld:ledge")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "drone and ledge cannot be compared: they see 14 states and 8 states" in err
+    code, _, err = trdlab("compare", trained, "gridworld:drone", "--gamma", 0.5)
+    assert (code, "The discount factors differ: 0.9 and 0.5." in err) == (2, True)
+
+
+def test_tables_are_compared_without_pytorch(tmp_path):
+    code = (
+        "import sys; from trdlab.cli import main\n"
+        f"try: main(['compare', *{TABLES}, '--episodes', '5'])\n"
+        "except SystemExit as end: assert not end.code\n"
+        "assert 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True)

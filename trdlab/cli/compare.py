@@ -1,0 +1,106 @@
+"""`trdlab compare`: what two agents expect at the same states."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from trdlab.cli import common
+
+_AGENT = (
+    "A run's folder, or RUN@STEP for an older checkpoint; or an exact table: gridworld:NAME, a map "
+    "file, or tabular:ENV_ID, with arguments after commas, such as gridworld:ledge,slip=0.2."
+)
+
+
+def compare(
+    first: Annotated[str, typer.Argument(metavar="A", help=_AGENT)],
+    second: Annotated[str, typer.Argument(metavar="B", help="Another one.")],
+    env: Annotated[
+        str | None,
+        typer.Option("--env", help="Where both act.", show_default="where A was made for"),
+    ] = None,
+    env_arguments: Annotated[
+        list[str] | None,
+        typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
+    ] = None,
+    gamma: Annotated[
+        float | None,
+        typer.Option(
+            "--gamma", help="Of exact tables: discount factor.", show_default="that of a run, 0.95"
+        ),
+    ] = None,
+    horizon: Annotated[
+        int | None,
+        typer.Option(
+            "--N", help="Of exact tables: explicit components.", show_default="that of a run, 4"
+        ),
+    ] = None,
+    width: Annotated[
+        int | None,
+        typer.Option(
+            "--w", help="Of exact tables: steps in each.", show_default="that of a run, 1"
+        ),
+    ] = None,
+    episodes: Annotated[
+        int | None,
+        typer.Option(
+            "--episodes",
+            min=1,
+            help="That each plays, and as many again to judge its forecasts by.",
+            show_default="50, to judge two exact tables 300",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first episode.")] = 0,
+    as_json: common.AsJson = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Write a picture there.",
+            show_default="without --json a new folder in explanations",
+        ),
+    ] = None,
+    verbose: common.Verbose = False,
+) -> None:
+    """Compare what two agents expect at the same states, when, and how far each can be trusted.
+
+    Both play episodes, and both are asked about the states of them all.
+    """
+    from trdlab.cli.progress import EpisodeProgress
+    from trdlab.explain.comparison import pair as two
+    from trdlab.show import comparison as show
+
+    agents = two.find_pair(
+        (first, second),
+        gamma=gamma,
+        horizon=horizon,
+        width=width,
+        env=env,
+        env_arguments=env_arguments or (),
+    )
+    if out is None and not as_json:
+        from trdlab.runs import free_name
+
+        out = free_name(Path("explanations"), f"{agents[0].name}-against-{agents[1].name}")
+    if out is not None:
+        from trdlab.show.comparison_plots import picture_path
+
+        path = picture_path(out)
+    errors = Console(stderr=True, highlight=False)
+    with EpisodeProgress(errors) as progress:
+        found = two.compare(*agents, episodes=episodes, seed=seed, on_episode=progress.on_episode)
+    if as_json:
+        from trdlab.show.comparison_data import comparison_to_dict
+
+        common.print_json(comparison_to_dict(found))
+    else:
+        console, ascii_only = common.new_console()
+        console.print(show.page(found, ascii_only=ascii_only))
+    if out is not None:
+        from trdlab.show.comparison_plots import write_picture
+
+        write_picture(found, path)
+        errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

@@ -1,0 +1,1 @@
+"""What two agents expect at the same states, and how far that is apart."""

@@ -1,0 +1,123 @@
+"""Claims about what a comparison rests on: whom to trust how far, the states, the futures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trdlab.explain.comparison.differences import ComparisonFinding, side_of
+from trdlab.explain.comparison.report import Comparison
+from trdlab.explain.trust import verdicts
+
+# ---- who can be trusted -------------------------------------------------------------------------
+
+
+@dataclass(eq=False, repr=False)
+class _Trusted(ComparisonFinding):
+    """How far the forecasts of one of them can be trusted, as its own report says."""
+
+    side: str
+
+    def _says(self, comparison: Comparison, verdict: verdicts.TrustFinding) -> bool:
+        report = comparison.reports[side_of(self.side)]
+        return report is not None and verdict.holds(report)
+
+
+@dataclass(eq=False, repr=False)
+class TrustedUpTo(_Trusted):
+    """Up to a step, and no further."""
+
+    step: int
+
+    def holds(self, comparison: Comparison) -> bool:
+        return self._says(comparison, verdicts.TrustedTo(self.step))
+
+
+@dataclass(eq=False, repr=False)
+class TrustedAllAlong(_Trusted):
+    """Over all explicit components."""
+
+    step: int
+
+    def holds(self, comparison: Comparison) -> bool:
+        return self._says(comparison, verdicts.TrustedThroughout(self.step))
+
+
+@dataclass(eq=False, repr=False)
+class TrustedNowhere(_Trusted):
+    """At no step."""
+
+    def holds(self, comparison: Comparison) -> bool:
+        return self._says(comparison, verdicts.NotTrusted())
+
+
+@dataclass(eq=False, repr=False)
+class TrustedUntested(_Trusted):
+    """Up to a step, where the reward was always the same, and no further."""
+
+    step: int
+
+    def holds(self, comparison: Comparison) -> bool:
+        return self._says(comparison, verdicts.ConstantTo(self.step))
+
+
+@dataclass(eq=False, repr=False)
+class NeverTested(_Trusted):
+    """The reward was always the same in its episodes."""
+
+    def holds(self, comparison: Comparison) -> bool:
+        return self._says(comparison, verdicts.NothingTested())
+
+
+# ---- what it rests on ---------------------------------------------------------------------------
+
+
+@dataclass(eq=False, repr=False)
+class ComparedAt(ComparisonFinding):
+    """The states, half of them of the episodes of each."""
+
+    states: int
+    episodes: int
+
+    def holds(self, comparison: Comparison) -> bool:
+        return (self.states, self.episodes) == (len(comparison.visits), comparison.episodes)
+
+
+@dataclass(eq=False, repr=False)
+class AllAlike(ComparisonFinding):
+    """So few of the episodes differ that nothing can be told of others."""
+
+    different: int
+
+    def holds(self, comparison: Comparison) -> bool:
+        return np.isnan(comparison.gap.low) and self.different == comparison.visits.different
+
+
+@dataclass(eq=False, repr=False)
+class EachTells(ComparisonFinding):
+    """Both tell of the same kind of future."""
+
+    policy: str
+    reward: str
+    ending: str
+
+    def holds(self, comparison: Comparison) -> bool:
+        told = (self.policy, self.reward, self.ending)
+        return all((f.policy, f.reward, f.ending) == told for f in comparison.futures)
+
+
+@dataclass(eq=False, repr=False)
+class OneTells(ComparisonFinding):
+    """They tell of different kinds, one of them of this."""
+
+    side: str
+    policy: str
+    reward: str
+    ending: str
+
+    def holds(self, comparison: Comparison) -> bool:
+        future, told = (
+            comparison.futures[side_of(self.side)],
+            (self.policy, self.reward, self.ending),
+        )
+        differ = comparison.futures[0] != comparison.futures[1]
+        return differ and (future.policy, future.reward, future.ending) == told

@@ -1,0 +1,152 @@
+"""Two agents brought together: found, checked that they can be compared, and compared."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from trdlab.errors import InputError
+from trdlab.explain.agents import AXIS, Agent, find_agent
+from trdlab.explain.assessment import assess
+from trdlab.explain.comparison.report import Comparison, compared
+from trdlab.explain.comparison.visits import visit
+from trdlab.explain.models import is_model
+from trdlab.explain.places import seen
+from trdlab.explain.trust.report import TrustReport
+
+_EPISODES, _EPISODES_OF_TABLES = 50, 300
+_MOST_STATES = 1_000
+
+
+def find_pair(
+    names: tuple[str, str],
+    *,
+    gamma: float | None = None,
+    horizon: int | None = None,
+    width: int | None = None,
+    env: str | None = None,
+    env_arguments: Sequence[str] = (),
+) -> tuple[Agent, Agent]:
+    """Returns two agents by their names; an exact table takes γ, N and w of a run beside it.
+
+    Args:
+        names: as `find_agent` reads them.
+        gamma: of exact tables, by default that of the run, or 0.95.
+        horizon: N of exact tables, by default that of the run, or 4.
+        width: w of exact tables, by default that of the run, or 1.
+        env: an environment to act in instead of their own (see `find_place`).
+        env_arguments: what to make that one with, as `KEY=VALUE`.
+
+    Raises:
+        InputError: there is no such agent, or something does not fit it.
+    """
+    exact = [is_model(name) for name in names]
+    own = {"gamma": gamma, "horizon": horizon, "width": width}
+    given: dict[str, Any] = {key: value for key, value in own.items() if value is not None}
+    if given and not any(exact):
+        raise InputError("Runs have their own γ, N and w.", "Leave out --gamma, --N and --w.")
+    found: dict[int, Agent] = {}
+    for i in sorted((0, 1), key=lambda i: exact[i]):  # runs first
+        axes = [agent.estimator.time_axis for agent in found.values()]
+        axis = replace(axes[0] if axes else AXIS, **given) if exact[i] else None
+        found[i] = find_agent(names[i], time_axis=axis, env=env, env_arguments=env_arguments)
+    return found[0], found[1]
+
+
+def compare(
+    first: Agent,
+    second: Agent,
+    *,
+    episodes: int | None = None,
+    judged_by: int | None = None,
+    seed: int = 0,
+    most_states: int = _MOST_STATES,
+    on_episode: Callable[[int], None] = lambda finished: None,
+) -> Comparison:
+    """Compares two agents at states of episodes of both, played where the first one acts.
+
+    Args:
+        first: called A.
+        second: called B; it acts where the first one does.
+        episodes: how many each plays, with the seeds from `seed` on; by default 50.
+        judged_by: how many more each plays to judge its forecasts by, 0 for none; by default as
+            many, or where nothing is said 300 of an exact table.
+        seed: of the first episode, and of everything else.
+        most_states: how many states are kept at most, half of them of the episodes of each.
+        on_episode: called with the number of finished episodes.
+
+    Raises:
+        InputError: the two do not see or do the same, discount otherwise, or there is no episode.
+    """
+    count = _EPISODES if episodes is None else episodes
+    if count < 1:
+        raise InputError(f"There are {count} episodes.", "Ask for at least 1.")
+    check_comparable(first, second)
+    away = () if second.place == first.place else first.place
+    there = replace(second, make=first.make, place=first.place, words=(*second.words, *away))
+    players, done = (first, there), 2 * count
+    visits = visit(
+        players, episodes=count, seed=seed, most_states=most_states, on_episode=on_episode
+    )
+    reports: list[TrustReport | None] = []
+    for agent in players:
+        usual = _EPISODES if agent.world is None else _EPISODES_OF_TABLES
+        more = judged_by if judged_by is not None else episodes or usual
+        going_on = partial(_count_on, on_episode, done)
+        reports.append(assess(agent, episodes=more, on_episode=going_on) if more else None)
+        done += more
+    return compared(
+        visits,
+        names=(first.name, second.name),
+        words=(first.words, there.words),
+        place=first.place,
+        action_names=first.action_names,
+        futures=(first.estimator.future, second.estimator.future),
+        reports=(reports[0], reports[1]),
+        episodes=count,
+        seconds_per_step=first.seconds_per_step,
+        seed=seed,
+    )
+
+
+def _count_on(on_episode: Callable[[int], None], before: int, finished: int) -> None:
+    on_episode(before + finished)
+
+
+def check_comparable(first: Agent, second: Agent) -> None:
+    """Checks that two agents see and do the same, and discount alike.
+
+    Raises:
+        InputError: they do not.
+    """
+    first.estimator.time_axis.shared(second.estimator.time_axis)
+    for what, one, other in (
+        ("see", *(_seen(agent) for agent in (first, second))),
+        ("have", *(_doable(agent, (first, second)) for agent in (first, second))),
+    ):
+        if one != other:
+            raise InputError(
+                f"{first.name} and {second.name} cannot be compared: they {what} {one} and "
+                f"{other}.",
+                "Compare agents that see and do the same.",
+            )
+
+
+def _seen(agent: Agent) -> str:
+    environments = agent.make(1, 0)
+    try:
+        return seen(environments)
+    finally:
+        environments.close()
+
+
+def _doable(agent: Agent, pair: tuple[Agent, Agent]) -> str:
+    """Returns the actions; in words if both agents have words for them."""
+    named = all(not is_numbered(of.action_names) for of in pair)
+    count = len(agent.action_names)
+    return f"the actions {', '.join(agent.action_names)}" if named else f"{count} actions"
+
+
+def is_numbered(action_names: Sequence[str]) -> bool:
+    """Returns whether actions have numbers for names."""
+    return all(name == f"action {i}" for i, name in enumerate(action_names))

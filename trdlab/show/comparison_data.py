@@ -1,0 +1,90 @@
+"""A comparison of two agents as plain data, for JSON."""
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.explain.comparison.findings import comparison_findings
+from trdlab.explain.comparison.report import SIDES, Comparison
+from trdlab.explain.trust.intervals import Estimates
+from trdlab.show.comparison import FURTHEST, LANGUAGE, explain_command
+from trdlab.show.trust_data import trust_to_dict
+from trdlab.statistics import Estimate
+
+SCHEMA = "trdlab.compare/1"
+
+
+def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
+    """Returns a comparison as plain data at full precision.
+
+    The schema is `trdlab.compare/1`: lists run over components (`N+1`), an estimate is `value`
+    with `low` and `high`; what does not exist is `null`.
+    """
+    visits, axis = comparison.visits, comparison.time_axis
+    return {
+        "schema": SCHEMA,
+        "agents": {
+            side: {
+                "name": comparison.names[i],
+                "words": list(comparison.words[i]),
+                "future": asdict(comparison.futures[i]),
+                "mean": _plain(_of_side(comparison.means, i)),
+            }
+            for i, side in enumerate(SIDES)
+        },
+        "place": list(comparison.place),
+        "time_axis": {**asdict(axis), "labels": axis.labels},
+        "episodes": comparison.episodes,
+        "different_episodes": visits.different,
+        "states": len(visits),
+        "difference": _plain(comparison.difference),
+        "apart": _plain(comparison.apart),
+        "of_any_action": _plain(comparison.of_any_action),
+        "gap": _plain(comparison.gap),
+        "shift": _plain(comparison.shift),
+        "agreement": _plain(comparison.agreement),
+        "furthest": [_furthest(comparison, m) for m in visits.furthest(FURTHEST)],
+        "findings": [
+            finding.to_dict() | {"sentence": LANGUAGE.say(finding, comparison)}
+            for finding in comparison_findings(comparison)
+        ],
+        "calibration": {
+            side: None if report is None else trust_to_dict(report)
+            for side, report in zip(SIDES, comparison.reports, strict=True)
+        },
+    }
+
+
+def _furthest(comparison: Comparison, m: int) -> dict[str, Any]:
+    visits = comparison.visits
+    return {
+        "player": SIDES[visits.player[m]],
+        "seed": int(visits.seed[m]),
+        "step": int(visits.step[m]),
+        "distance": float(visits.apart[m]),
+        "command": explain_command(comparison, m) or None,
+        **{
+            side: {
+                "action": comparison.action_names[visits.actions[i, m]],
+                "components": visits.expected[i, m].tolist(),
+            }
+            for i, side in enumerate(SIDES)
+        },
+    }
+
+
+def _of_side(means: Estimates, side: int) -> Estimates:
+    return Estimates(means.value[side], means.low[side], means.high[side])
+
+
+def _plain(found: Estimates | Estimate) -> dict[str, Any]:
+    return {name: _finite(getattr(found, name)) for name in ("value", "low", "high")}
+
+
+def _finite(numbers: FloatArray | float) -> Any:
+    if isinstance(numbers, np.ndarray):
+        return [_finite(float(x)) for x in numbers]
+    return numbers if math.isfinite(numbers) else None

@@ -57,6 +57,11 @@ def test_a_rhythm_is_found_under_noise_on_a_slope_and_of_costs(seed, sign, slope
     )
 
 
+def test_a_period_is_told_in_seconds_of_play_too():
+    said = told(learned(bumps(3, 11, 19, 27, 35), seconds_per_step=1 / 15))
+    assert "peaks about every 8 steps (0.53 s), from t+3 to t+35." in said[Rhythm]
+
+
 def test_what_comes_at_uneven_times_has_peaks_and_no_rhythm():
     said = told(learned(bumps(3, 9, 22, 32) + noise(0)))
     assert Rhythm not in said

@@ -62,7 +62,7 @@ def peaks(moment: Moment, action: str) -> list[int]:
     """Returns the components at which what is expected of an action peaks, in order of time.
 
     A peak stands out by itself and by its prominence: both are at least `SHARE` of the largest. Of
-    what was learned the prominence is also more than such forecasts are off by there.
+    what was learned the prominence is also no less than what such forecasts are off by there.
     """
     shares = _shares(moment, action)
     allowed = np.maximum(SHARE, _doubt(moment, action))

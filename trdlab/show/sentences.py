@@ -85,7 +85,7 @@ TEMPLATES: dict[type[Claim], str] = {
     ),
     rhythm.Rhythm: (
         "Before {end:begin} the {effect:effect} expected of {action} peaks about every "
-        "{period:steps}, from {first:label} to {last:label}."
+        "{period:period}, from {first:label} to {last:label}."
     ),
     rhythm.Peak: (
         "Before {end:begin} the largest {effect:effect} to be expected of {action} is that of "
@@ -147,12 +147,31 @@ TEMPLATES: dict[type[Claim], str] = {
 
 _EFFECT = Form(lambda effect, _: str(effect), r"(?:notable )?(?:reward|cost)", str)
 
+
+def _forms(told: Explanation) -> dict[str, Form]:
+    moment = told.moment
+    seconds = moment.seconds_per_step
+    forms = forms_of(moment.time_axis, moment.action_names, seconds)
+    return forms | {"effect": _EFFECT, "period": _period(forms["steps"], seconds)}
+
+
+def _period(steps: Form, seconds: float | None) -> Form:
+    """Returns the form of so many steps, with their seconds of play where these are known."""
+
+    def show(count: int, _: int = 0) -> str:
+        text = steps.show(count, 0)
+        return text if seconds is None else f"{text} ({count * seconds:.2g} s)"
+
+    def read_back(text: str) -> int | None:
+        count: int | None = steps.read(text.partition(" (")[0])
+        return count if count is not None and show(count) == text else None
+
+    return Form(show, steps.pattern + r"(?: \(\S+ s\))?", read_back)
+
+
 MOMENTS = Language[Explanation](
     TEMPLATES,
-    lambda told: (
-        {"effect": _EFFECT}
-        | forms_of(told.moment.time_axis, told.moment.action_names, told.moment.seconds_per_step)
-    ),
+    _forms,
     evidence=lambda told: told.moment,
     given=lambda told: {"action": told.action, "foil": told.foil},
 )

@@ -211,7 +211,8 @@ def test_uncertainty_is_told_where_there_is_any():
     explanation = explained(world, TimeAxis(0.9, 6), action="right", foil="up")
     (either,) = found(chances.EitherOr, explanation)
     # two moves to the right in a row succeed with 1/4: then 4 is paid at t+1
-    assert (either.component, either.reward, either.chance) == (1, 4.0, pytest.approx(0.25))
+    assert (either.verb, either.amount, either.component) == ("pays", 4.0, 1)
+    assert either.chance == pytest.approx(0.25)
     (give,) = found(chances.GiveOrTake, explanation)
     assert 0 < give.deviation < 2
     assert not found(chances.GiveOrTake, explained())  # nothing slips on the drone's map
@@ -263,12 +264,21 @@ def test_nothing_is_forecast_that_cannot_be_trusted():
 
 
 def test_small_components_of_what_was_learned_are_no_first_reward():
-    rows = [[0.01, -0.02, 0.03, 1.0, 0.02, 0.5]]
+    rows = [[0.03, -0.04, 0.03, 1.0, 0.02, 0.5]]
     (first,) = found(forecast.FirstStepReward, explain(moment(rows), "a"))
     assert (first.component, first.effect) == (3, "notable reward")
     exactly = replace(moment(rows), totals=np.array([2.0]))
     firsts = found(forecast.FirstStepReward, explain(exactly, "a"))
     assert [(x.component, x.effect) for x in firsts] == [(0, "reward"), (1, "cost")]
+
+
+def test_next_to_nothing_is_no_first_cost_and_no_lead():
+    rows = [[0.0, 0.0, 0.0, -0.0004, 1.85], [0.0, 0.0, 0.0, 0.0, 1.77]]
+    explanation = explain(replace(moment(rows), totals=np.array([2.0, 1.9])), "a", "b")
+    assert not found(forecast.FirstStepReward, explanation)
+    assert found(forecast.NextToNothing, explanation) == [forecast.NextToNothing("a", 4)]
+    assert not found(contrast.LessCostly, explanation)
+    assert found(worth.Better, explanation)
 
 
 @pytest.mark.parametrize(

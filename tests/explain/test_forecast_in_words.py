@@ -92,12 +92,13 @@ def test_what_the_words_say_is_what_comes(seed: int):
             error = rewards.std(axis=0).max() / EPISODES**0.5
             assert means[at] >= means.max() - 7.0 * error
         elif found := re.match(
-            rf"At {STEP} go pays either {NUMBER} or nothing; the chance that it pays is {NUMBER} %",
+            rf"At {STEP} go either (pays|costs) {NUMBER} or nothing; the chance that it does is "
+            rf"{NUMBER} %",
             text,
         ):
-            at, paid = step(found[1]), float(found[2])
+            at, paid = step(found[1]), float(found[3]) * (1 if found[2] == "pays" else -1)
             assert set(np.unique(rewards[:, at])) <= {0.0, paid}
-            assert near(rewards[:, at] != 0.0, float(found[3]) / 100.0)
+            assert near(rewards[:, at] != 0.0, float(found[4]) / 100.0)
         elif found := re.match(rf"Nothing is expected of go before t\+{STEPS}", text):
             assert not rewards.any()
         else:

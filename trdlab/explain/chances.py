@@ -41,19 +41,24 @@ def chances(moment: Moment, action: str) -> Iterator[Finding]:
         yield GiveOrTake(action, moment.q_value(action), deviation)
     steps = known.outcomes[a][: explicit_end(moment)] if known.outcomes else ()
     either = [
-        EitherOr(action, i, reward, chance)
+        EitherOr(action, i, verb_of(reward), abs(reward), chance)
         for i, step in enumerate(steps)
         for reward, chance in step.items()
         if set(step) == {0.0, reward} and reward != 0.0
     ]
     if either:
-        yield max(either, key=lambda x: abs(x.reward) * x.chance)
+        yield max(either, key=lambda x: x.amount * x.chance)
     over = np.flatnonzero(known.survival[a] < 0.5)
     if over.size:
         i = int(over[0])
         chance = 1.0 - float(known.survival[a, i])
         sure = SurelyOver(action, i)
         yield sure if sure.holds(moment) else LikelyOver(action, i, chance)
+
+
+def verb_of(reward: float) -> str:
+    """Returns what an action does that is rewarded so."""
+    return "pays" if reward > 0.0 else "costs"
 
 
 @dataclass(eq=False, repr=False)
@@ -103,7 +108,8 @@ class EitherOr(Finding):
 
     action: str
     component: int
-    reward: float
+    verb: str
+    amount: float
     chance: float
 
     def holds(self, moment: Moment) -> bool:
@@ -119,7 +125,8 @@ class EitherOr(Finding):
         return (
             expected.index(max(expected)) == self.component
             and expected[self.component] > 0.0
-            and agrees(self.reward, reward)
+            and self.verb == verb_of(reward)
+            and agrees(self.amount, abs(reward))
             and agrees(self.chance, chance)
         )
 

@@ -9,6 +9,7 @@ from trdlab.arrays import FloatArray
 from trdlab.explain.finding import Finding, agrees
 from trdlab.explain.limits import doubtful
 from trdlab.explain.moment import Moment, same
+from trdlab.explain.rhythm import NEGLIGIBLE
 from trdlab.explain.worth import compare_totals, compare_values
 
 NOISE = 0.1
@@ -69,7 +70,7 @@ def _sooner(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
 def _crossings(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     lead = running_lead(moment, action, foil)
     runs = [list(run) for _, run in groupby(np.flatnonzero(lead), key=lambda i: lead[i] > 0)]
-    least = _noise(moment, lead)
+    least = _least(moment, lead)
     clear = [run for run in runs if np.abs(lead[run]).max() >= least]
     found: list[Finding] = []
     for before, now in pairwise(clear):
@@ -270,11 +271,18 @@ def running_lead(moment: Moment, action: str, foil: str) -> FloatArray:
 
 
 def clear_lead(moment: Moment, action: str, foil: str) -> FloatArray:
-    """Returns `[N]`: the running lead, 0 where it may be noise (see `NOISE`)."""
-    lead = running_lead(moment, action, foil)[:-1]
-    return np.where(np.abs(lead) >= _noise(moment, lead), lead, 0.0)
+    """Returns `[N]`: the running lead, 0 where it is next to nothing (see `_least`)."""
+    lead = running_lead(moment, action, foil)
+    return np.where(np.abs(lead) >= _least(moment, lead), lead, 0.0)[:-1]
 
 
-def _noise(moment: Moment, lead: FloatArray) -> float:
-    """Returns how large a lead can be and still be noise."""
-    return 0.0 if moment.is_exact else NOISE * float(np.abs(lead).max(initial=0.0))
+def _least(moment: Moment, lead: FloatArray) -> float:
+    """Returns the least lead that is told, as a share of the largest of `lead [N+1]`.
+
+    What was learned may be noise up to `NOISE` of the largest explicit one; of an exact table
+    `NEGLIGIBLE` of the largest is left out.
+    """
+    size = np.abs(lead)
+    if moment.is_exact:
+        return NEGLIGIBLE * float(size.max())
+    return NOISE * float(size[:-1].max(initial=0.0))

@@ -48,6 +48,9 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
 
 def _when(moment: Moment, action: str) -> Iterator[Finding]:
     """Yields what comes first, how likely the largest reward is, and where rewards peak."""
+    if not stands_out(moment, action).any():
+        yield NextToNothing(action, explicit_end(moment))
+        return
     firsts = tuple(_firsts(moment, action))
     yield from firsts
     yield from likelihood(moment, action)
@@ -148,6 +151,19 @@ class NothingBefore(Finding):
     def holds(self, moment: Moment) -> bool:
         is_nothing = not moment.components(self.action)[: self.end].any()
         return is_nothing and self.end == explicit_end(moment) > 0
+
+
+@dataclass(eq=False, repr=False)
+class NextToNothing(Finding):
+    """Some components of those that a forecast speaks of differ from zero, but none stands out."""
+
+    action: str
+    end: int
+
+    def holds(self, moment: Moment) -> bool:
+        row = undiscounted(moment, self.action)
+        little = bool(row.any()) and not stands_out(moment, self.action).any()
+        return little and self.end == explicit_end(moment)
 
 
 @dataclass(eq=False, repr=False)

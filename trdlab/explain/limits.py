@@ -12,7 +12,7 @@ from trdlab.explain.moment import Moment
 if TYPE_CHECKING:
     from trdlab.explain.trust.report import TrustReport
 
-_LEAST_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25  # what is smaller cannot be taken out
+LEAST_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25  # what is smaller cannot be taken out
 
 
 def judged(moment: Moment, report: "TrustReport") -> Moment:
@@ -46,7 +46,7 @@ def explicit_end(moment: Moment) -> int:
 
     It is one that is not to be trusted, or so far away that its discount cannot be taken out.
     """
-    silent = doubtful(moment) | (moment.time_axis.discounts < _LEAST_DISCOUNT)
+    silent = doubtful(moment) | (moment.time_axis.discounts < LEAST_DISCOUNT)
     silent[-1] = True
     return int(silent.argmax())
 

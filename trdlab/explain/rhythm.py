@@ -8,11 +8,14 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.explain.finding import Finding, agrees
-from trdlab.explain.limits import explicit_end
+from trdlab.explain.limits import LEAST_DISCOUNT, explicit_end
 from trdlab.explain.moment import Moment
 
 SHARE = 0.2
 """What stands out: at least this share of the largest that is expected at any one step."""
+
+NEGLIGIBLE = 0.01
+"""What an exact table expects below this share is not worth a sentence."""
 
 ALIKE = 0.05
 """How far what is about the same may be from its mean, as a share of that."""
@@ -74,12 +77,19 @@ def peaks(moment: Moment, action: str) -> list[int]:
 def stands_out(moment: Moment, action: str) -> BoolArray:
     """Returns `[K]`: which of the trusted explicit components are more than noise.
 
-    Of an exact table that is every one that is not zero, of what was learned those that are at
-    least `SHARE` of the largest.
+    Of what was learned those are at least `SHARE` of the largest. Of an exact table, which has no
+    noise, they are at least `NEGLIGIBLE` of the largest, or of the reward that would be worth the
+    residual if every later step paid it.
     """
-    row = undiscounted(moment, action)
+    row, axis = undiscounted(moment, action), moment.time_axis
     size = np.abs(row)
-    return np.asarray((size > 0.0) & (moment.is_exact | (size >= SHARE * size.max(initial=0.0))))
+    largest = float(size.max(initial=0.0))
+    if not moment.is_exact:
+        return np.asarray((size > 0.0) & (size >= SHARE * largest))
+    later = abs(float(moment.components(action)[-1])) * (1.0 - axis.gamma**axis.width)
+    begins = float(axis.discounts[-1])
+    rate = later / begins if begins >= LEAST_DISCOUNT else 0.0
+    return np.asarray((size > 0.0) & (size >= NEGLIGIBLE * max(largest, rate)))
 
 
 def largest(moment: Moment, action: str) -> int:

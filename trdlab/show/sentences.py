@@ -66,6 +66,7 @@ TEMPLATES: dict[type[Claim], str] = {
     forecast.AllBeyond: (
         "All of the {value:value} that {action} is worth lies at {component:label}."
     ),
+    forecast.NextToNothing: "Next to nothing is expected of {action} before {end:begin}.",
     forecast.NothingBefore: "Nothing is expected of {action} before {end:begin}.",
     forecast.FirstStepReward: (
         "The first {effect:effect} to be expected of {action} is that of {component:when}: "
@@ -114,8 +115,8 @@ TEMPLATES: dict[type[Claim], str] = {
         "episode to episode (one standard deviation)."
     ),
     chances.EitherOr: (
-        "At {component:label} {action} pays either {reward:amount} or nothing; the chance that it "
-        "pays is {chance:percent}."
+        "At {component:label} {action} either {verb:text} {amount:amount} or nothing; the chance "
+        "that it does is {chance:percent}."
     ),
     chances.LikelyOver: (
         "After {action} the episode is likely over by {component:begin}: {chance:percent}."

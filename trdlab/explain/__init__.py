@@ -13,9 +13,11 @@ from trdlab.explain.tabular import gridworld_moment, tabular_moment
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
-    from trdlab.explain.agents import Agent, find_agent, gridworld_agent, run_agent
+    from trdlab.explain.agents import Agent, find_agent, gridworld_agent, run_agent, tabular_agent
     from trdlab.explain.assessment import Copying, assess
     from trdlab.explain.branches import Branches, Branching
+    from trdlab.explain.comparison.pair import compare, find_pair
+    from trdlab.explain.comparison.report import Comparison
     from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
     from trdlab.explain.counterfactual import Counterfactual, play_to
     from trdlab.explain.episodes import Counting, Episode, collect
@@ -34,6 +36,7 @@ __all__ = [
     "Branching",
     "Calibration",
     "Ceiling",
+    "Comparison",
     "CopyableGymEnvironments",
     "Copying",
     "Counterfactual",
@@ -53,9 +56,11 @@ __all__ = [
     "assess",
     "calibrate",
     "collect",
+    "compare",
     "explain",
     "find_agent",
     "find_flips",
+    "find_pair",
     "gridworld_agent",
     "gridworld_moment",
     "judge",
@@ -64,6 +69,7 @@ __all__ = [
     "play_to",
     "revise",
     "run_agent",
+    "tabular_agent",
     "tabular_moment",
     "tell",
     "trust_findings",
@@ -74,6 +80,10 @@ _HOMES = {
     "find_agent": "agents",
     "gridworld_agent": "agents",
     "run_agent": "agents",
+    "tabular_agent": "agents",
+    "compare": "comparison.pair",
+    "find_pair": "comparison.pair",
+    "Comparison": "comparison.report",
     "Copying": "assessment",
     "assess": "assessment",
     "Branches": "branches",

@@ -34,6 +34,10 @@ Foil = Annotated[
 WhoseTies = Annotated[Ties, typer.Option("--ties", help="Whose future, where optimal actions tie.")]
 Plot = Annotated[Path | None, typer.Option("--plot", help="Write a picture: .png, .pdf or .svg.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")]
+AGENT = (
+    "A run's folder, or RUN@STEP for an older checkpoint; or an exact table: gridworld:NAME, a map "
+    "file, or tabular:ENV_ID, with arguments after commas, such as gridworld:ledge,slip=0.2."
+)
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Show tracebacks.")]
 

@@ -8,14 +8,9 @@ from rich.console import Console
 
 from trdlab.cli import common
 
-_AGENT = (
-    "A run's folder, or RUN@STEP for an older checkpoint; or an exact table: gridworld:NAME, a map "
-    "file, or tabular:ENV_ID, with arguments after commas, such as gridworld:ledge,slip=0.2."
-)
-
 
 def compare(
-    first: Annotated[str, typer.Argument(metavar="A", help=_AGENT)],
+    first: Annotated[str, typer.Argument(metavar="A", help=common.AGENT)],
     second: Annotated[str, typer.Argument(metavar="B", help="Another one.")],
     env: Annotated[
         str | None,

@@ -12,12 +12,7 @@ from trdlab.cli import common
 def explain(
     agent: Annotated[
         str,
-        typer.Argument(
-            metavar="AGENT",
-            help="A run's folder, or RUN@STEP for an older checkpoint; or an exact table: "
-            "gridworld:NAME, a map file, or tabular:ENV_ID, with arguments after commas, such as "
-            "gridworld:ledge,slip=0.2.",
-        ),
+        typer.Argument(metavar="AGENT", help=common.AGENT),
     ],
     what: Annotated[
         str | None,

@@ -54,7 +54,7 @@ WORDS = {
 
 @cache
 def reports() -> tuple[TrustReport | None, ...]:
-    """Five reports with five different verdicts, and none."""
+    """Six reports with six different verdicts, and none."""
     axis = TimeAxis(0.95, 3)
     agent = gridworld_agent("ledge,slip=0.3,exploring_starts=true", axis)
 
@@ -77,7 +77,7 @@ def reports() -> tuple[TrustReport | None, ...]:
     unpaid = replace(still, estimator=replace(table, decomposition=zero), make=free.make)
     judged = (agent, with_noise(2), with_noise(0), unpaid, with_noise(1))
     *found, last = (assess(of, episodes=200, epsilon=0.0) for of in judged)
-    return (*found, constant_at_first(last), None)
+    return (*found, constant_at_first(last), assess(agent, episodes=5), None)
 
 
 def constant_at_first(report: TrustReport) -> TrustReport:
@@ -134,7 +134,7 @@ def comparisons(draw: st.DrawFn) -> Comparison:
         step=np.arange(count),
         different=draw(st.sampled_from([1, 30])),
     )
-    one, other = draw(st.permutations(range(6)))[:2]
+    one, other = draw(st.permutations(range(7)))[:2]
     futures = Future("the optimal policy"), Future("the greedy policy", "sign of each reward")
     return compared(
         visits,

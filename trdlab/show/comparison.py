@@ -80,6 +80,10 @@ TEMPLATES: dict[type[Claim], str] = {
         "The forecasts of {side:side} can be trusted over their whole horizon, to {step:until}."
     ),
     background.TrustedNowhere: "The forecasts of {side:side} cannot be trusted at any step.",
+    background.TooFewToJudge: (
+        "Too few different episodes tell how far to trust the forecasts of {side:side}: "
+        "{episodes:count}."
+    ),
     background.TrustedUntested: (
         "The forecasts of {side:side} cannot be trusted beyond {step:until}, and up to there the "
         "reward was always the same."

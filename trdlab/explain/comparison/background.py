@@ -44,10 +44,23 @@ class TrustedAllAlong(_Trusted):
 
 @dataclass(eq=False, repr=False)
 class TrustedNowhere(_Trusted):
-    """At no step."""
+    """At no step, though enough episodes tell of the first one."""
 
     def holds(self, comparison: Comparison) -> bool:
-        return self._says(comparison, verdicts.NotTrusted())
+        report = comparison.reports[side_of(self.side)]
+        is_told = report is not None and report.calibration.states[0] != "too few episodes"
+        return is_told and self._says(comparison, verdicts.NotTrusted())
+
+
+@dataclass(eq=False, repr=False)
+class TooFewToJudge(_Trusted):
+    """At no step, and that is because too few different episodes tell of the first one."""
+
+    episodes: int
+
+    def holds(self, comparison: Comparison) -> bool:
+        few = self._says(comparison, verdicts.TooFewAt(0, self.episodes))
+        return few and self._says(comparison, verdicts.NotTrusted())
 
 
 @dataclass(eq=False, repr=False)

@@ -130,11 +130,14 @@ def furthest(comparison: Comparison, m: int) -> differences.FurthestApart:
 def _trust(comparison: Comparison) -> Findings:
     found: list[ComparisonFinding] = []
     for side, report in zip(SIDES, comparison.reports, strict=True):
-        for verdict in trust_findings(report) if report is not None else ():
-            numbers = verdict.to_dict()
-            kind = _VERDICTS.get(numbers.pop("kind"))
-            if kind is not None:
-                found.append(kind(side, **numbers))
+        told = {} if report is None else {x.kind(): x.to_dict() for x in trust_findings(report)}
+        if "not-trusted" in told and "too-few-at" in told:
+            found.append(background.TooFewToJudge(side, told["too-few-at"]["episodes"]))
+            continue
+        for kind, claim in _VERDICTS.items():
+            if kind in told:
+                del told[kind]["kind"]
+                found.append(claim(side, **told[kind]))
     return tuple(found)
 
 

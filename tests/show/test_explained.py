@@ -85,12 +85,16 @@ def test_bars_that_are_not_to_be_trusted_are_faded():
     assert explanation is not None
     assert report is not None
     trust = replace(report.trust, components=2, residual=True)
-    moment = replace(explanation.moment, trust=trust)
+    of_foils = replace(report.trust, components=3, residual=False)
+    moment = replace(explanation.moment, trust=trust, foil_trust=of_foils)
     figure = moment_figure(replace(explanation, moment=moment), explanation.foil, "ledge")
     figure.canvas.draw()
-    for ax in [ax for ax in figure.axes if ax.patches]:
-        alpha = [bar.get_alpha() for bar in ax.patches]
-        assert [a is not None for a in alpha] == [False, False, True, True, False]
+    faded = [
+        [bar.get_alpha() is not None for bar in ax.patches] for ax in figure.axes if ax.patches
+    ]
+    assert faded[0] == [False, False, True, True, False]
+    assert faded[1] == [False, False, False, True, True]
+    assert faded[2] == [False, False, True, True, True], "a difference needs both"
     assert "faded" in figure.texts[-1].get_text()
 
 

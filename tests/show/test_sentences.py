@@ -78,6 +78,7 @@ def moments(draw: st.DrawFn) -> Moment:
 
     components = draw(st.integers(0, horizon))
     trust = Trust(axis, components, horizon, draw(st.integers(0, components)), draw(st.booleans()))
+    foil_trust = Trust(axis, max(0, components - 1), horizon, 0, draw(st.booleans()))
     off_by = [0.01, 0.2, 0.3, 0.5, 0.7, 2.0, 4.0, 9.0, np.nan, np.nan]
     errors = draw(st.permutations(off_by))[: horizon + 1]
     return Moment(
@@ -90,6 +91,9 @@ def moments(draw: st.DrawFn) -> Moment:
         what_ifs=(WhatIf("γ", 0.95, 0.01, 0.99, q_values),),
         trust=draw(st.sampled_from([None, trust])),
         error=draw(st.sampled_from([None, size * np.array(errors)])),
+        policy=draw(st.sampled_from([None, np.eye(actions)[0]])),
+        foil_trust=draw(st.sampled_from([None, foil_trust])),
+        foil_error=draw(st.sampled_from([None, 2.0 * size * np.array(errors)])),
         only_reward=draw(st.sampled_from([None, 4.0 * size, -4.0 * size])),
     )
 

@@ -39,7 +39,7 @@ def chances(moment: Moment, action: str) -> Iterator[Finding]:
     deviation = float(known.return_deviation[a])
     if deviation > 0.0:
         yield GiveOrTake(action, moment.q_value(action), deviation)
-    steps = known.outcomes[a][: explicit_end(moment)] if known.outcomes else ()
+    steps = known.outcomes[a][: explicit_end(moment, action)] if known.outcomes else ()
     either = [
         EitherOr(action, i, verb_of(reward), abs(reward), chance)
         for i, step in enumerate(steps)
@@ -113,7 +113,11 @@ class EitherOr(Finding):
     chance: float
 
     def holds(self, moment: Moment) -> bool:
-        known, a, end = moment.uncertainty, moment.index(self.action), explicit_end(moment)
+        known, a, end = (
+            moment.uncertainty,
+            moment.index(self.action),
+            explicit_end(moment, self.action),
+        )
         if known is None or not known.outcomes or self.component >= end:
             return False
         expected = [

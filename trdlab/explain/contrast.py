@@ -259,7 +259,8 @@ def difference(moment: Moment, action: str, foil: str) -> FloatArray:
 def doubtful_share(moment: Moment, action: str, foil: str) -> float:
     """Returns the share of Σ|action − foil| in components not to be trusted; 0 of no difference."""
     size = np.abs(difference(moment, action, foil))
-    return float(size[doubtful(moment)].sum() / size.sum()) if size.any() else 0.0
+    doubt = doubtful(moment, action) | doubtful(moment, foil)
+    return float(size[doubt].sum() / size.sum()) if size.any() else 0.0
 
 
 def running_lead(moment: Moment, action: str, foil: str) -> FloatArray:

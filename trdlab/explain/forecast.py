@@ -31,8 +31,8 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
     Raises:
         InputError: there is no such action.
     """
-    row, end = moment.components(action), explicit_end(moment)
-    if doubtful(moment).all():
+    row, end = moment.components(action), explicit_end(moment, action)
+    if doubtful(moment, action).all():
         return ()
     if not row[:end].any():
         return (*_nothing(moment, action), *chances(moment, action))
@@ -49,7 +49,7 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
 def _when(moment: Moment, action: str) -> Iterator[Finding]:
     """Yields what comes first, how likely the largest reward is, and where rewards peak."""
     if not stands_out(moment, action).any():
-        yield NextToNothing(action, explicit_end(moment))
+        yield NextToNothing(action, explicit_end(moment, action))
         return
     firsts = tuple(_firsts(moment, action))
     yield from firsts
@@ -60,7 +60,7 @@ def _when(moment: Moment, action: str) -> Iterator[Finding]:
 def _nothing(moment: Moment, action: str) -> tuple[Finding, ...]:
     """Returns what is said where no explicit component differs from zero."""
     beyond = AllBeyond(action, moment.q_value(action), moment.time_axis.horizon)
-    before = NothingBefore(action, explicit_end(moment))
+    before = NothingBefore(action, explicit_end(moment, action))
     claims = (EarnsNothing(action), beyond, before)
     return tuple(claim for claim in claims if claim.holds(moment))[:1]
 
@@ -88,18 +88,19 @@ def _effect(moment: Moment, action: str, component: int) -> str:
 def _accuracy(moment: Moment, action: str) -> Iterator[Finding]:
     """Yields what such forecasts are off by, where that matters."""
     i = largest(moment, action)
-    if moment.error is not None and not moment.is_exact:
-        error = float(moment.error[i])
+    errors = moment.error_of(action)
+    if errors is not None and not moment.is_exact:
+        error = float(errors[i])
         if error >= _MATTERS * abs(moment.components(action)[i]):  # not so if it is NaN
             yield OffBy(action, i, error)
 
 
-def _speaks_of_all(moment: Moment) -> bool:
-    """Returns whether all components can be told of: they are trusted, or of an exact table.
+def _speaks_of_all(moment: Moment, action: str) -> bool:
+    """Returns whether all components of an action can be told of: trusted, or of an exact table.
 
     Short episodes of such a table may not have shown what it knows of the residual.
     """
-    return moment.is_exact or not doubtful(moment).any()
+    return moment.is_exact or not doubtful(moment, action).any()
 
 
 def _beyond(moment: Moment, action: str) -> Iterator[Finding]:
@@ -111,7 +112,7 @@ def _beyond(moment: Moment, action: str) -> Iterator[Finding]:
 
 
 def _centre(moment: Moment, action: str) -> Iterator[Finding]:
-    end = explicit_end(moment)
+    end = explicit_end(moment, action)
     explicit = moment.components(action)[:end]
     if one_sign(explicit) and np.count_nonzero(explicit) > 1 and moment.time_axis.width == 1:
         yield CentreOfMass(action, end, float(explicit @ np.arange(end) / explicit.sum()))
@@ -124,7 +125,7 @@ class EarnsNothing(Finding):
     action: str
 
     def holds(self, moment: Moment) -> bool:
-        return not moment.components(self.action).any() and _speaks_of_all(moment)
+        return not moment.components(self.action).any() and _speaks_of_all(moment, self.action)
 
 
 @dataclass(eq=False, repr=False)
@@ -137,7 +138,9 @@ class AllBeyond(Finding):
 
     def holds(self, moment: Moment) -> bool:
         row = moment.components(self.action)
-        at_end = self.component == moment.time_axis.horizon > 0 and _speaks_of_all(moment)
+        at_end = self.component == moment.time_axis.horizon > 0 and _speaks_of_all(
+            moment, self.action
+        )
         return at_end and not row[:-1].any() and row[-1] != 0.0 and agrees(self.value, row[-1])
 
 
@@ -150,7 +153,7 @@ class NothingBefore(Finding):
 
     def holds(self, moment: Moment) -> bool:
         is_nothing = not moment.components(self.action)[: self.end].any()
-        return is_nothing and self.end == explicit_end(moment) > 0
+        return is_nothing and self.end == explicit_end(moment, self.action) > 0
 
 
 @dataclass(eq=False, repr=False)
@@ -163,7 +166,7 @@ class NextToNothing(Finding):
     def holds(self, moment: Moment) -> bool:
         row = undiscounted(moment, self.action)
         little = bool(row.any()) and not stands_out(moment, self.action).any()
-        return little and self.end == explicit_end(moment)
+        return little and self.end == explicit_end(moment, self.action)
 
 
 @dataclass(eq=False, repr=False)
@@ -211,10 +214,11 @@ class OffBy(Finding):
     error: float
 
     def holds(self, moment: Moment) -> bool:
-        if moment.error is None or not undiscounted(moment, self.action).any():
+        errors = moment.error_of(self.action)
+        if errors is None or not undiscounted(moment, self.action).any():
             return False
         i = largest(moment, self.action)
-        return self.component == i and agrees(self.error, float(moment.error[i]))
+        return self.component == i and agrees(self.error, float(errors[i]))
 
 
 @dataclass(eq=False, repr=False)
@@ -228,7 +232,7 @@ class CentreOfMass(Finding):
     def holds(self, moment: Moment) -> bool:
         explicit = moment.components(self.action)[: self.end]
         is_defined = moment.time_axis.width == 1 and one_sign(explicit)
-        if self.end != explicit_end(moment) or not is_defined:
+        if self.end != explicit_end(moment, self.action) or not is_defined:
             return False
         return agrees(self.step, float(explicit @ np.arange(self.end) / explicit.sum()))
 
@@ -250,6 +254,6 @@ class ShareBeyond(Finding):
             self.component == moment.time_axis.horizon > 0
             and one_sign(row)
             and row[-1] != 0.0
-            and _speaks_of_all(moment)
+            and _speaks_of_all(moment, self.action)
             and agrees(self.share, float(row[-1] / row.sum()))
         )

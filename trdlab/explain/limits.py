@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trdlab.arrays import BoolArray
+from trdlab.arrays import BoolArray, FloatArray
 from trdlab.explain.finding import Finding
 from trdlab.explain.moment import Moment
 
 if TYPE_CHECKING:
+    from trdlab.explain.trust.calibration import Calibration
     from trdlab.explain.trust.report import TrustReport
+    from trdlab.explain.trust.trusted import Trust
 
 LEAST_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25  # what is smaller cannot be taken out
 
@@ -24,36 +26,40 @@ def judged(moment: Moment, report: "TrustReport") -> Moment:
         moment: what is expected.
         report: on the estimator that expects it.
     """
-    calibration = report.calibration
-    error, reliability = calibration.error, calibration.reliability
+    reliability = report.calibration.reliability
     return replace(
         moment,
         trust=report.trust,
-        error=np.where(np.isfinite(error.low), np.sqrt(error.value), np.nan),
+        foil_trust=report.foil_trust,
+        error=_root_mean_square(report.calibration),
+        foil_error=None if report.foils is None else _root_mean_square(report.foils),
         only_reward=None if reliability is None else reliability.amount,
     )
 
 
-def doubtful(moment: Moment) -> BoolArray:
-    """Returns `[N+1]`: what is not to be trusted; nothing of it where that has not been judged."""
-    if moment.trust is None:
-        return np.zeros(moment.time_axis.num_components, dtype=np.bool_)
-    return moment.trust.doubtful
+def _root_mean_square(calibration: "Calibration") -> FloatArray:
+    error = calibration.error
+    return np.where(np.isfinite(error.low), np.sqrt(error.value), np.nan)
 
 
-def explicit_end(moment: Moment) -> int:
+def doubtful(moment: Moment, action: str) -> BoolArray:
+    """Returns `[N+1]`: what is not to be trusted of an action; nothing where that is not judged."""
+    return _doubtful(moment.trust_of(action), moment)
+
+
+def explicit_end(moment: Moment, action: str) -> int:
     """Returns the first component that a forecast is silent of: the residual, or one before it.
 
     It is one that is not to be trusted, or so far away that its discount cannot be taken out.
     """
-    silent = doubtful(moment) | (moment.time_axis.discounts < LEAST_DISCOUNT)
+    silent = doubtful(moment, action) | (moment.time_axis.discounts < LEAST_DISCOUNT)
     silent[-1] = True
     return int(silent.argmax())
 
 
 def limits(moment: Moment) -> tuple[Finding, ...]:
     """Returns what is not to be trusted of a moment; nothing where that has not been judged."""
-    first = int(doubtful(moment).argmax())
+    first = int(_doubtful(moment.trust, moment).argmax())
     residual = moment.time_axis.horizon
     claims = (
         TrustedWhole(),
@@ -70,7 +76,7 @@ class TrustedWhole(Finding):
     """Every component is trusted, the residual too."""
 
     def holds(self, moment: Moment) -> bool:
-        return moment.trust is not None and not doubtful(moment).any()
+        return moment.trust is not None and not _doubtful(moment.trust, moment).any()
 
 
 @dataclass(eq=False, repr=False)
@@ -78,7 +84,7 @@ class NowhereTrusted(Finding):
     """No component is trusted, nor is the residual."""
 
     def holds(self, moment: Moment) -> bool:
-        return moment.trust is not None and bool(doubtful(moment).all())
+        return moment.trust is not None and bool(_doubtful(moment.trust, moment).all())
 
 
 @dataclass(eq=False, repr=False)
@@ -88,7 +94,7 @@ class NotTrustedAt(Finding):
     component: int
 
     def holds(self, moment: Moment) -> bool:
-        *explicit, residual = doubtful(moment).tolist()
+        *explicit, residual = _doubtful(moment.trust, moment).tolist()
         return residual and not any(explicit) and self.component == len(explicit) > 0
 
 
@@ -99,7 +105,7 @@ class NotTrustedFrom(Finding):
     component: int
 
     def holds(self, moment: Moment) -> bool:
-        *explicit, residual = doubtful(moment).tolist()
+        *explicit, residual = _doubtful(moment.trust, moment).tolist()
         return residual and any(explicit) and explicit.index(True) == self.component > 0
 
 
@@ -111,6 +117,12 @@ class NotTrustedBetween(Finding):
     residual: int
 
     def holds(self, moment: Moment) -> bool:
-        *explicit, residual = doubtful(moment).tolist()
+        *explicit, residual = _doubtful(moment.trust, moment).tolist()
         begins = any(explicit) and explicit.index(True) == self.component
         return begins and not residual and self.residual == len(explicit)
+
+
+def _doubtful(trust: "Trust | None", moment: Moment) -> BoolArray:
+    if trust is None:
+        return np.zeros(moment.time_axis.num_components, dtype=np.bool_)
+    return trust.doubtful

@@ -79,11 +79,13 @@ class Moment:
         what_ifs: the quantities that can be varied, where there is a model to solve again.
         uncertainty: spread and survival, where they are known.
         trust: how far such forecasts can be trusted, if that has been judged.
-        seconds_per_step: how long a step takes as people play, if that is known.
+        foil_trust: the same of first actions that the policy does not take.
         error: `[N+1]`, what such forecasts are off by, in discounted reward: the root mean square
             of predicted − observed, NaN where it is not known; None if it has not been judged.
+        foil_error: the same of first actions that the policy does not take.
         only_reward: the one reward that was ever observed besides 0; None where there were several,
             and where that is not known.
+        seconds_per_step: how long a step takes as people play, if that is known.
     """
 
     decomposition: RewardDecomposition
@@ -97,9 +99,11 @@ class Moment:
     what_ifs: tuple[WhatIf, ...] = ()
     uncertainty: Uncertainty | None = None
     trust: "Trust | None" = None
-    seconds_per_step: float | None = None
+    foil_trust: "Trust | None" = None
     error: FloatArray | None = None
+    foil_error: FloatArray | None = None
     only_reward: float | None = None
+    seconds_per_step: float | None = None
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):
@@ -141,6 +145,18 @@ class Moment:
     def q_value(self, action: str) -> float:
         """Returns the Q-value of one action."""
         return float(self.q_values[self.index(action)])
+
+    def trust_of(self, action: str) -> "Trust | None":
+        """Returns how far forecasts of such an action can be trusted, if that has been judged."""
+        return self.foil_trust if self._is_judged_foil(action) else self.trust
+
+    def error_of(self, action: str) -> FloatArray | None:
+        """`[N+1]`: what forecasts of such an action are off by, if that has been judged."""
+        return self.foil_error if self._is_judged_foil(action) else self.error
+
+    def _is_judged_foil(self, action: str) -> bool:
+        chance = 1.0 if self.policy is None else self.policy[self.index(action)]
+        return bool(chance == 0.0) and self.foil_trust is not None
 
     def total(self, action: str) -> float:
         """Returns the undiscounted total of one action, NaN where none exists or is known."""

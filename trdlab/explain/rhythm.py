@@ -35,7 +35,7 @@ def undiscounted(moment: Moment, action: str) -> FloatArray:
 
     With w = 1 these are expected rewards; a group is discounted to its own first step (errata P9).
     """
-    end = explicit_end(moment)
+    end = explicit_end(moment, action)
     return moment.components(action)[:end] / moment.time_axis.discounts[:end]
 
 
@@ -99,7 +99,7 @@ def largest(moment: Moment, action: str) -> int:
 
 def steady(moment: Moment, action: str) -> "Steady | None":
     """Returns that every step pays about the same, where that is so."""
-    row, end = undiscounted(moment, action), explicit_end(moment)
+    row, end = undiscounted(moment, action), explicit_end(moment, action)
     claim = Steady(action, end, effect_of(row[0]), float(row.mean())) if row.size else None
     return claim if claim is not None and claim.holds(moment) else None
 
@@ -112,7 +112,7 @@ def regular(moment: Moment, action: str, named: Collection[int] = ()) -> tuple[F
         action: the name of one of which something is expected.
         named: components of which it need not be said that they are the largest.
     """
-    found, end, at = peaks(moment, action), explicit_end(moment), largest(moment, action)
+    found, end, at = peaks(moment, action), explicit_end(moment, action), largest(moment, action)
     what = effect_of(undiscounted(moment, action)[at])
     claims: list[Finding] = []
     if len(found) > 1:
@@ -143,10 +143,10 @@ def _shares(moment: Moment, action: str) -> FloatArray:
 
 def _doubt(moment: Moment, action: str) -> FloatArray:
     """Returns `[K]`: what such forecasts are off by, in the unit of `_shares`; 0 if not known."""
-    row = undiscounted(moment, action)
-    if moment.error is None or moment.is_exact or not row.any():
+    row, errors = undiscounted(moment, action), moment.error_of(action)
+    if errors is None or moment.is_exact or not row.any():
         return np.zeros(len(row))
-    error = np.nan_to_num(moment.error[: len(row)]) / moment.time_axis.discounts[: len(row)]
+    error = np.nan_to_num(errors[: len(row)]) / moment.time_axis.discounts[: len(row)]
     return np.asarray(error / np.abs(row).max())
 
 
@@ -176,7 +176,11 @@ class Steady(Finding):
 
     def holds(self, moment: Moment) -> bool:
         row = undiscounted(moment, self.action)
-        if self.end != explicit_end(moment) or len(row) < 3 or moment.time_axis.width != 1:
+        if (
+            self.end != explicit_end(moment, self.action)
+            or len(row) < 3
+            or moment.time_axis.width != 1
+        ):
             return False
         mean = float(row.mean())
         return (
@@ -202,7 +206,7 @@ class Peak(Finding):
 
     def holds(self, moment: Moment) -> bool:
         shares, i = np.abs(_shares(moment, self.action)), self.component
-        if self.end != explicit_end(moment) or i >= self.end:
+        if self.end != explicit_end(moment, self.action) or i >= self.end:
             return False
         value = float(moment.components(self.action)[i])
         return (
@@ -226,7 +230,7 @@ class Peaks(Finding):
     def holds(self, moment: Moment) -> bool:
         found = peaks(moment, self.action)
         return (
-            self.end == explicit_end(moment)
+            self.end == explicit_end(moment, self.action)
             and len(found) > 1
             and self.components == _clearest(moment, self.action, found)
             and self.effect == _effect(moment, self.action)
@@ -249,8 +253,9 @@ class Rhythm(Finding):
     last: int
 
     def holds(self, moment: Moment) -> bool:
-        found, is_judged = peaks(moment, self.action), moment.is_exact or moment.error is not None
-        if self.end != explicit_end(moment) or len(found) < (3 if is_judged else 4):
+        found = peaks(moment, self.action)
+        is_judged = moment.is_exact or moment.error_of(self.action) is not None
+        if self.end != explicit_end(moment, self.action) or len(found) < (3 if is_judged else 4):
             return False
         spacings = np.diff(found)
         mean = float(spacings.mean())

@@ -150,7 +150,8 @@ def explain_agent(
     if "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for --episodes 50.")
     told = tell(play(agent, seed)) if "episode" in wanted else None
-    copying = Copying() if "calibration" in wanted else None
+    copied = "calibration" in wanted or "contrast" in wanted
+    copying = (Copying() if agent.world is None else Copying(episodes=100)) if copied else None
     report = (
         assess(agent, episodes=count, copying=copying, on_episode=on_episode) if count else None
     )

@@ -13,6 +13,7 @@ from trdlab.arrays import FloatArray
 from trdlab.errors import OutputError
 from trdlab.explain.contrast import difference
 from trdlab.explain.explanation import Explanation
+from trdlab.explain.limits import doubtful
 from trdlab.explain.moment import Moment
 from trdlab.explain.tried import Trial
 from trdlab.explain.trust.report import TrustReport
@@ -135,12 +136,12 @@ def moment_figure(
         share_scale(axes[:-1])
         leave_room([axes[-1]], difference(moment, action, foil)[None])
     leave_room(axes[: len(names)], np.stack([moment.components(name) for name in names]))
-    for ax in axes:
-        fade(ax, moment)
+    for ax, of in zip(axes, (*([name] for name in names), names), strict=False):
+        fade(ax, moment, of)
         if ax is not axes[-1]:
             ax.label_outer()
     figure.supylabel("expected discounted reward", fontsize=9, color=_MUTED)
-    _foot(figure, moment, height)
+    _foot(figure, moment, names, height)
     return figure
 
 
@@ -176,21 +177,21 @@ def leave_room(axes: Sequence[Axes], rows: FloatArray) -> None:
         )
 
 
-def fade(ax: Axes, moment: Moment) -> Axes:
+def fade(ax: Axes, moment: Moment, actions: Sequence[str]) -> Axes:
     """Fades those bars of a moment that are not to be trusted; the axes hold one per component.
 
     Args:
         ax: the axes with the bars, as `plot_components` draws them.
-        moment: whose `trust` says which; without it nothing is faded.
+        moment: that knows what can be trusted of which action.
+        actions: the names of those that the bars tell of, both of them for a difference.
 
     Returns:
         `ax`.
     """
-    trust = moment.trust
-    if trust is not None:
-        for bar, is_doubtful in zip(ax.patches, trust.doubtful, strict=True):
-            if is_doubtful:
-                bar.set_alpha(_FADED)
+    faded = np.any([doubtful(moment, action) for action in actions], axis=0)
+    for bar, is_doubtful in zip(ax.patches, faded, strict=True):
+        if is_doubtful:
+            bar.set_alpha(_FADED)
     return ax
 
 
@@ -237,9 +238,9 @@ def trust_figure(report: TrustReport, title: str) -> Figure:
     return figure
 
 
-def _foot(figure: Figure, moment: Moment, height: float) -> None:
-    future, trust = moment.future, moment.trust
-    is_faded = trust is not None and bool(trust.doubtful.any())
+def _foot(figure: Figure, moment: Moment, actions: Sequence[str], height: float) -> None:
+    future = moment.future
+    is_faded = any(doubtful(moment, action).any() for action in actions)
     faded = " · faded: has not proved better than a guess" if is_faded else ""
     meaning = whiskers(moment)
     lines = (

@@ -298,8 +298,9 @@ def _lengths(moment: Moment) -> FloatArray:
     """Returns `[A, N+1]`: how long whiskers are, 0 or NaN where there are none."""
     if moment.uncertainty is not None:
         return moment.uncertainty.deviation
-    error = 0.0 if moment.error is None else moment.error
-    return np.broadcast_to(error, moment.decomposition.components.shape)
+    none = np.zeros(moment.time_axis.num_components)
+    errors = [moment.error_of(action) for action in moment.action_names]
+    return np.stack([none if error is None else error for error in errors])
 
 
 def plot_contrast(ax: Axes, moment: Moment, action: str, foil: str) -> Axes:

@@ -60,6 +60,9 @@ TEMPLATES: dict[type[Claim], str] = {
     verdicts.FoilsNotTrusted: (
         "Forecasts of first actions that are not its own cannot be trusted at any step."
     ),
+    verdicts.FoilsUnjudged: (
+        "Too little was seen of first actions that are not its own to judge forecasts of them."
+    ),
     shortcomings.TooLate: "It expects rewards {steps:steps} too late.",
     shortcomings.TooEarly: "It expects rewards {steps:steps} too early.",
     shortcomings.AmountOff: "It expects {times:value} times as much as comes.",

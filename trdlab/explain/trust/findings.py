@@ -31,6 +31,7 @@ from trdlab.explain.trust.verdicts import (
     FoilsNotTrusted,
     FoilsTrustedThroughout,
     FoilsTrustedTo,
+    FoilsUnjudged,
     IsNotKnown,
     NoChance,
     NoSkillAt,
@@ -149,9 +150,13 @@ def _foils(report: TrustReport) -> Findings:
     found = report.foil_trust
     if found is None or found.time_axis.horizon == 0:
         return ()
-    claims: list[TrustFinding] = [FoilsNotTrusted()]
-    if found.last_step is not None:
-        claims = [FoilsTrustedThroughout(found.last_step), FoilsTrustedTo(found.last_step)]
+    last = found.components * report.time_axis.width - 1
+    claims: list[TrustFinding] = [
+        FoilsNotTrusted(),
+        FoilsUnjudged(),
+        FoilsTrustedThroughout(last),
+        FoilsTrustedTo(last),
+    ]
     return tuple(claim for claim in claims if claim.holds(report))
 
 

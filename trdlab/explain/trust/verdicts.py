@@ -1,6 +1,7 @@
 """Claims about how far a forecast can be trusted, and why no further."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -257,13 +258,27 @@ class FoilsTrustedThroughout(TrustFinding):
 
 @dataclass(eq=False, repr=False)
 class FoilsNotTrusted(TrustFinding):
-    """They are trusted at no step: the first one already is not."""
+    """They are trusted at no step: the first one is surely no better than a guess, or wrong."""
 
     def holds(self, report: TrustReport) -> bool:
-        if report.foils is None:
-            return False
-        passed, _ = _passed(report.foils)
-        return passed == 0 < report.time_axis.horizon
+        return report.time_axis.horizon > 0 and _foils_fail(report) == "surely"
+
+
+@dataclass(eq=False, repr=False)
+class FoilsUnjudged(TrustFinding):
+    """Too little was seen of them to tell whether the first step can be trusted."""
+
+    def holds(self, report: TrustReport) -> bool:
+        return report.time_axis.horizon > 0 and _foils_fail(report) == "perhaps"
+
+
+def _foils_fail(report: TrustReport) -> Literal["surely", "perhaps"] | None:
+    """Returns whether forecasts of foils fail at the first step; None if not, or not judged."""
+    found = report.foils
+    if found is None or trusted(found)[0]:
+        return None
+    is_constant = found.states[0] == "nothing to predict"
+    return "surely" if is_constant or found.skill.high[0] <= 0.0 else "perhaps"
 
 
 def _limit_and_skill(report: TrustReport, component: int) -> tuple[Estimate, Estimate]:

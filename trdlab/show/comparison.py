@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from trdlab.arrays import FloatArray
 from trdlab.explain.comparison import background, differences
 from trdlab.explain.comparison.differences import ComparisonFinding
 from trdlab.explain.comparison.findings import comparison_findings
@@ -216,20 +217,24 @@ def _setting(comparison: Comparison) -> str:
 
 
 def _table(comparison: Comparison, *, ascii_only: bool) -> Table:
-    means, difference = comparison.means.value, comparison.difference
+    means, difference, axis = comparison.means.value, comparison.difference, comparison.time_axis
     decimals = decimals_for([*means.ravel(), *difference.value])
+    has_intervals = not math.isnan(comparison.gap.low)
     table = Table(box=None, padding=(0, 3, 0, 0), header_style="bold", pad_edge=False)
-    for heading in ("steps", *SIDES, "B − A", "95 % interval"):
+    for heading in ("steps", *SIDES, "B − A", *(["95 % interval"] if has_intervals else [])):
         justify: Any = "left" if heading == "steps" else "right"
         table.add_column(fit(heading, ascii_only=ascii_only), justify=justify, no_wrap=True)
-    for c in _rows(comparison):
-        cells = [number(float(x), decimals) for x in (*means[:, c], difference.value[c])]
-        cells.append(_interval(difference[c], decimals))
-        table.add_row(
-            *(fit(x, ascii_only=ascii_only) for x in (comparison.time_axis.label(c), *cells))
-        )
-    sums = [number(float(x), decimals) for x in (*means.sum(axis=1), comparison.gap.value)]
-    table.add_row("in all", *sums, _interval(comparison.gap, decimals), style="bold")
+
+    def add(label: str, values: FloatArray, estimate: Estimate, style: str = "") -> None:
+        cells = [label, *(number(float(x), decimals) for x in (*values, estimate.value))]
+        if has_intervals:
+            ends = (number(end, decimals) for end in (estimate.low, estimate.high))
+            cells.append(" to ".join(ends))
+        table.add_row(*(fit(cell, ascii_only=ascii_only) for cell in cells), style=style)
+
+    for c in _rows(comparison) if axis.horizon else ():
+        add(axis.label(c), means[:, c], difference[c])
+    add("in all", means.sum(axis=1), comparison.gap, "bold")
     return table
 
 
@@ -237,12 +242,6 @@ def _rows(comparison: Comparison) -> list[int]:
     """Returns the components that are shown: all, or of many those that differ most."""
     order = np.argsort(-comparison.apart.value, kind="stable")
     return sorted(order[:_MOST_ROWS].tolist())
-
-
-def _interval(estimate: Estimate, decimals: int) -> str:
-    if math.isnan(estimate.low):
-        return ""
-    return f"{number(estimate.low, decimals)} to {number(estimate.high, decimals)}"
 
 
 def _moment(comparison: Comparison, m: int) -> list[tuple[str, int]]:

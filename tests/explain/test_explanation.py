@@ -9,8 +9,9 @@ import pytest
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import chances, contrast, flips, forecast, rhythm, worth
+from trdlab.explain import chances, contrast, flips, forecast, leads, rhythm, worth
 from trdlab.explain.agents import gridworld_agent
+from trdlab.explain.contrast import in_short
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import collect
 from trdlab.explain.explanation import (
@@ -22,7 +23,7 @@ from trdlab.explain.explanation import (
 )
 from trdlab.explain.finding import Finding
 from trdlab.explain.limits import judged
-from trdlab.explain.moment import Moment, moment_of
+from trdlab.explain.moment import Moment, Uncertainty, moment_of
 from trdlab.explain.tabular import gridworld_moment
 from trdlab.explain.trust.report import judge
 from trdlab.explain.trust.trusted import Trust
@@ -57,13 +58,13 @@ def test_the_drone_prefers_down_because_it_pays_sooner():
     assert (explanation.action, explanation.foil) == ("down", "up")
     (totals,) = found(worth.EqualTotals, explanation)
     assert totals.total == pytest.approx(4.0)
-    (sooner,) = found(contrast.MoreImmediate, explanation)
+    (sooner,) = found(leads.MoreImmediate, explanation)
     assert (sooner.leader, sooner.other, sooner.last_step) == ("down", "up", 3)
     assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
     (better,) = found(worth.BetterByDiscount, explanation)
     assert better.better_value == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4)
     assert better.worse_value == pytest.approx(4 * GAMMA**4)
-    assert found(contrast.StaysAhead, explanation) == [contrast.StaysAhead("down", "up")]
+    assert found(leads.StaysAhead, explanation) == [leads.StaysAhead("down", "up")]
 
 
 def test_the_fewest_components_that_justify_down_are_its_three_coins():
@@ -178,17 +179,15 @@ def test_what_is_not_defined_is_not_said():
 
 def test_crossings_are_found_at_their_step():
     explanation = explain(moment([[0.0, 0.0, 3.0, 0.0], [1.0, 0.5, 0.0, 0.0]]), "a", "b")
-    (crossing,) = found(contrast.Overtakes, explanation)
-    assert crossing == contrast.Overtakes("a", "b", 2, 3.0, 1.5)
-    assert found(contrast.MoreImmediate, explanation) == [
-        contrast.MoreImmediate("b", "a", 1.5, 0.0, 1)
-    ]
+    (crossing,) = found(leads.Overtakes, explanation)
+    assert crossing == leads.Overtakes("a", "b", 2, 3.0, 1.5)
+    assert found(leads.MoreImmediate, explanation) == [leads.MoreImmediate("b", "a", 1.5, 0.0, 1)]
 
 
 def test_costs_are_not_called_rewards():
     explanation = explain(moment([[-1.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]), "a", "b")
-    assert found(contrast.LessCostly, explanation)
-    assert not found(contrast.MoreImmediate, explanation)
+    assert found(leads.CostsLess, explanation)
+    assert not found(leads.MoreImmediate, explanation)
     (first,) = found(forecast.FirstStepReward, explanation)
     assert (first.effect, first.component, first.reward) == ("cost", 0, -1.0)
     assert not found(rhythm.Peak, explanation)
@@ -198,7 +197,7 @@ def test_a_learned_table_is_explained_like_an_exact_one():
     world = Gridworld(load_map("drone"))
     learned = learn(world.mdp, TimeAxis(GAMMA, 4), agent_steps=200_000, seed=0)
     explanation = explain(moment_of(learned, 0, world.action_names), "down", "up")
-    (sooner,) = found(contrast.MoreImmediate, explanation)
+    (sooner,) = found(leads.MoreImmediate, explanation)
     assert (sooner.leader, sooner.last_step) == ("down", 3)
     assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3, abs=0.02)
     assert not found(worth.EqualTotals, explanation)  # samples tell no undiscounted total
@@ -209,15 +208,106 @@ def test_a_learned_table_is_explained_like_an_exact_one():
 def test_uncertainty_is_told_where_there_is_any():
     world = Gridworld(parse_map("T = treasure 4 terminal\nslip: 0.5\n---\n...\nS.T\n..."))
     explanation = explained(world, TimeAxis(0.9, 6), action="right", foil="up")
-    (either,) = found(chances.EitherOr, explanation)
+    (first,) = found(forecast.FirstChance, explanation)
     # two moves to the right in a row succeed with 1/4: then 4 is paid at t+1
-    assert (either.verb, either.amount, either.component) == ("pays", 4.0, 1)
-    assert either.chance == pytest.approx(0.25)
+    assert (first.effect, first.amount, first.component) == ("reward", 4.0, 1)
+    assert first.chance == pytest.approx(0.25)
+    assert first.discounted == pytest.approx(0.9)
+    assert not found(chances.EitherOr, explanation)  # it would say the same of the same step
     (give,) = found(chances.GiveOrTake, explanation)
     assert 0 < give.deviation < 2
     assert not found(chances.GiveOrTake, explained())  # nothing slips on the drone's map
     over = found(chances.SurelyOver, explained(axis=TimeAxis(GAMMA, 6)))
     assert over == [chances.SurelyOver("down", 5)]
+
+
+def chancy(outcomes: tuple[dict[float, float], ...], beyond: float = 0.0) -> Moment:
+    """A moment of one action whose steps pay so, undiscounted mean times γ^k."""
+    axis = TimeAxis(GAMMA, len(outcomes))
+    means = [sum(reward * p for reward, p in step.items()) for step in outcomes]
+    row = np.append(means, beyond) * axis.discounts
+    known = np.zeros((1, len(row)))
+    uncertainty = Uncertainty(known, np.ones(1), known + 1.0, (outcomes,))
+    parts = RewardDecomposition(row[None], axis)
+    future = Future("the optimal policy")
+    return Moment(parts, ("a",), future, totals=row[None].sum(-1), uncertainty=uncertainty)
+
+
+def test_a_chance_is_told_only_of_what_matters():
+    small, large = {0.0: 0.95, -0.1: 0.05}, {0.0: 0.5, 0.4: 0.4, 0.8: 0.1}
+    trivial = explain(chancy((small, {6.0: 1.0})), "a")
+    assert not found(chances.EitherOr, trivial)  # 0.10 beside 6
+    assert not found(chances.EitherOr, explain(chancy((small, small), beyond=7.0), "a"))
+    risk = explain(chancy((large, {0.0: 0.96, -4.0: 0.04})), "a")
+    assert found(chances.EitherOr, risk) == []  # it is the first cost, and told as that
+    (first,) = found(forecast.FirstChance, risk)
+    assert (first.effect, first.component, first.amount, first.chance) == ("cost", 1, 4.0, 0.04)
+    twice = explain(chancy(({0.0: 0.98, -4.0: 0.02}, large, {0.0: 0.9, -4.0: 0.1})), "a")
+    assert found(chances.EitherOr, twice) == [chances.EitherOr("a", 2, "costs", 4.0, 0.1)]
+    assert "At t+2 a costs 4 with a chance of 10 %, and otherwise nothing." in sentences(twice)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "kind", "said"),
+    [
+        ([1, 0, 0, 0], [0, 0, 0, 0.5], leads.MoreImmediate, "by t they are worth 1.00 against 0."),
+        (
+            [0, 0, 2, 0],
+            [0, 0, 0, 1],
+            leads.PaysMore,
+            "By t+2 a is expected to have paid more than b: worth 2.00 against 0 now.",
+        ),
+        (
+            [2, -0.5, 0, 0],
+            [0, 0, 0, 1],
+            leads.MoreImmediate,  # it is furthest ahead before the cost
+            "by t they are worth 2.00 against 0.",
+        ),
+        (
+            [-0.5, 2, 0, 0],
+            [-1, 0, 0, 1],
+            leads.PaysMoreNet,
+            "By t+1 a is expected to have paid more than b, costs subtracted: worth 1.50 against "
+            "-1.00 now.",
+        ),
+        (
+            [-0.5, -0.5, 3, 0],
+            [-1, -1, 3, 0],
+            leads.CostsLess,
+            "By t+1 a is expected to have cost less than b: 1.00 against 2.00 in present worth.",
+        ),
+    ],
+)
+def test_a_lead_is_told_in_words_that_are_true_of_it(a, b, kind, said):
+    told = explain(moment([[*map(float, a), 0.0], [*map(float, b), 0.0]]), "a", "b")
+    assert [type(x) for x in told.contrast if isinstance(x, leads.LEADS)] == [kind]
+    assert said in " ".join(sentences(told))
+
+
+def test_what_makes_up_for_a_lead_is_the_last_word():
+    told = explain(moment([[0.0, 0.0, 3.0], [1.0, 1.0, 0.2]]), "a", "b")
+    assert [type(x) for x in in_short(told.contrast)] == [
+        worth.Better,
+        leads.MoreImmediate,
+        leads.MakesUp,
+    ]
+    assert "What comes at t+2…∞ makes up for the lead of b: it is worth 2.80 more after a." in (
+        sentences(told)
+    )
+    ahead = explain(moment([[1.0, 1.0, 0.2], [0.0, 0.0, 1.0]]), "a", "b")
+    assert [type(x) for x in in_short(ahead.contrast)] == [worth.Better, leads.MoreImmediate]
+    assert in_short(()) == ()
+
+
+def test_the_centre_is_told_in_steps_where_no_rhythm_is():
+    several = explain(moment([[0.0, 1.0, 0.0, 0.0, 0.0, 3.0, 0.0]]), "a")
+    (centre,) = found(forecast.CentreOfMass, several)
+    assert centre.step == pytest.approx(4.0)  # (1 + 3 · 5) / 4
+    assert "come 4.0 steps from now on average." in " ".join(sentences(several))
+    assert not found(forecast.CentreOfMass, explain(moment([[0.0, 1.0, 0.05, 0.0]]), "a"))
+    regular = explain(moment([[0.0, 1.0, 0.0] * 5]), "a")
+    assert found(rhythm.Rhythm, regular)
+    assert not found(forecast.CentreOfMass, regular)
 
 
 @pytest.mark.parametrize(
@@ -277,7 +367,7 @@ def test_next_to_nothing_is_no_first_cost_and_no_lead():
     explanation = explain(replace(moment(rows), totals=np.array([2.0, 1.9])), "a", "b")
     assert not found(forecast.FirstStepReward, explanation)
     assert found(forecast.NextToNothing, explanation) == [forecast.NextToNothing("a", 4)]
-    assert not found(contrast.LessCostly, explanation)
+    assert not found(leads.CostsLess, explanation)
     assert found(worth.Better, explanation)
 
 
@@ -312,11 +402,11 @@ def test_an_error_is_told_where_it_is_as_large_as_half_of_what_is_expected():
 def test_a_lead_that_may_be_noise_is_not_called_sooner():
     rows = [[0.01, 1.0, 0.0, 0.3, 0.0], [0.03, 0.0, 0.4, 0.0, 0.0]]
     explanation = explain(moment(rows), "a", "b")
-    (sooner,) = found(contrast.MoreImmediate, explanation)
+    (sooner,) = found(leads.MoreImmediate, explanation)
     assert (sooner.leader, sooner.last_step) == ("a", 1)  # b leads by 0.02 at first
-    assert not found(contrast.Overtakes, explanation)
+    assert not found(leads.Overtakes, explanation)
     exactly = replace(moment(rows), totals=np.array([2.0, 1.0]))
-    assert found(contrast.MoreImmediate, explain(exactly, "a", "b"))[0].leader == "b"
+    assert found(leads.MoreImmediate, explain(exactly, "a", "b"))[0].leader == "b"
 
 
 def test_a_moment_is_judged_by_a_report():

@@ -71,13 +71,18 @@ def test_what_the_words_say_is_what_comes(seed: int):
     read = 0
     for text in sentences(explanation):
         if found := re.match(
-            rf"The first (reward|cost) to be expected of go is that of {STEP}: "
-            rf"{NUMBER} on average, worth {NUMBER} now",
+            rf"The first (reward|cost) to be expected of go is that of {STEP}: (?:"
+            rf"{NUMBER} on average, worth {NUMBER} now|"
+            rf"{NUMBER} with a chance of {NUMBER} %, and otherwise nothing; worth {NUMBER} now)",
             text,
         ):
             at, sign = step(found[2]), 1.0 if found[1] == "reward" else -1.0
-            assert near(rewards[:, at], float(found[3]))
-            assert near(rewards[:, at] * discounts[at], float(found[4]))
+            if found[3]:
+                assert near(rewards[:, at], float(found[3]))
+            else:
+                assert set(np.unique(rewards[:, at])) == {0.0, sign * float(found[5])}
+                assert near(rewards[:, at] != 0.0, float(found[6]) / 100.0)
+            assert near(rewards[:, at] * discounts[at], float(found[4] or found[7]))
             for earlier in range(at):  # no step before it pays on average
                 wins = sign * rewards[:, earlier]
                 assert wins.mean() <= 5.0 * wins.std() / EPISODES**0.5
@@ -92,8 +97,8 @@ def test_what_the_words_say_is_what_comes(seed: int):
             error = rewards.std(axis=0).max() / EPISODES**0.5
             assert means[at] >= means.max() - 7.0 * error
         elif found := re.match(
-            rf"At {STEP} go either (pays|costs) {NUMBER} or nothing; the chance that it does is "
-            rf"{NUMBER} %",
+            rf"At {STEP} go (pays|costs) {NUMBER} with a chance of {NUMBER} %, "
+            r"and otherwise nothing",
             text,
         ):
             at, paid = step(found[1]), float(found[3]) * (1 if found[2] == "pays" else -1)

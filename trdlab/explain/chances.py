@@ -1,6 +1,6 @@
 """Chances: what is uncertain about what an action is expected to pay."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from trdlab.explain.finding import Finding, agrees
 from trdlab.explain.limits import explicit_end
 from trdlab.explain.moment import Moment
-from trdlab.explain.rhythm import largest, undiscounted
+from trdlab.explain.rhythm import NEGLIGIBLE, SHARE, largest, undiscounted
 
 
 def likelihood(moment: Moment, action: str) -> Iterator[Finding]:
@@ -26,34 +26,53 @@ def likelihood(moment: Moment, action: str) -> Iterator[Finding]:
             yield claim
 
 
-def chances(moment: Moment, action: str) -> Iterator[Finding]:
+def chances(moment: Moment, action: str, named: Collection[int] = ()) -> Iterator[Finding]:
     """Yields how much an action's reward varies, where one step does, and how long it lasts.
 
     Args:
         moment: the decompositions of every action, and how uncertain they are.
         action: the name of one.
+        named: components whose chances have been told.
     """
     known, a = moment.uncertainty, moment.index(action)
     if known is None:
         return
-    deviation = float(known.return_deviation[a])
-    if deviation > 0.0:
-        yield GiveOrTake(action, moment.q_value(action), deviation)
-    steps = known.outcomes[a][: explicit_end(moment, action)] if known.outcomes else ()
+    varies = GiveOrTake(action, moment.q_value(action), float(known.return_deviation[a]))
+    if varies.holds(moment):
+        yield varies
     either = [
         EitherOr(action, i, verb_of(reward), abs(reward), chance)
-        for i, step in enumerate(steps)
-        for reward, chance in step.items()
-        if set(step) == {0.0, reward} and reward != 0.0
+        for i, (reward, chance) in one_or_nothing(moment, action).items()
     ]
     if either:
-        yield max(either, key=lambda x: x.amount * x.chance)
+        most = max(either, key=lambda x: x.amount * x.chance)
+        if most.component not in named and most.holds(moment):
+            yield most
     over = np.flatnonzero(known.survival[a] < 0.5)
     if over.size:
         i = int(over[0])
         chance = 1.0 - float(known.survival[a, i])
         sure = SurelyOver(action, i)
         yield sure if sure.holds(moment) else LikelyOver(action, i, chance)
+
+
+def one_or_nothing(moment: Moment, action: str) -> dict[int, tuple[float, float]]:
+    """Returns the steps that pay one amount, or cost one, or nothing: the reward, and its chance.
+
+    Args:
+        moment: the decompositions of every action, and how uncertain they are.
+        action: the name of one.
+    """
+    known = moment.uncertainty
+    if known is None or not known.outcomes:
+        return {}
+    steps = known.outcomes[moment.index(action)][: explicit_end(moment, action)]
+    return {
+        i: (reward, chance)
+        for i, step in enumerate(steps)
+        for reward, chance in step.items()
+        if set(step) == {0.0, reward} and reward != 0.0
+    }
 
 
 def verb_of(reward: float) -> str:
@@ -88,7 +107,7 @@ class PutAt(Finding):
 
 @dataclass(eq=False, repr=False)
 class GiveOrTake(Finding):
-    """The standard deviation of an action's whole discounted reward."""
+    """The standard deviation of an action's whole discounted reward, if it is not `NEGLIGIBLE`."""
 
     action: str
     value: float
@@ -99,12 +118,20 @@ class GiveOrTake(Finding):
             return False
         deviation = float(moment.uncertainty.return_deviation[moment.index(self.action)])
         value = moment.q_value(self.action)
-        return deviation > 0.0 and agrees(self.value, value) and agrees(self.deviation, deviation)
+        return (
+            deviation > NEGLIGIBLE * abs(value)
+            and agrees(self.value, value)
+            and agrees(self.deviation, deviation)
+        )
 
 
 @dataclass(eq=False, repr=False)
 class EitherOr(Finding):
-    """A step that pays one amount or nothing; of several, where most of it is expected."""
+    """A step that pays one amount or nothing; of several, where most of it is expected.
+
+    The amount matters: it is at least `SHARE` of the action's value and of the largest reward that
+    is expected of it at one step, and what is expected of it at least `NEGLIGIBLE`.
+    """
 
     action: str
     component: int
@@ -113,22 +140,17 @@ class EitherOr(Finding):
     chance: float
 
     def holds(self, moment: Moment) -> bool:
-        known, a, end = (
-            moment.uncertainty,
-            moment.index(self.action),
-            explicit_end(moment, self.action),
-        )
-        if known is None or not known.outcomes or self.component >= end:
+        either = one_or_nothing(moment, self.action)
+        if self.component not in either:
             return False
-        expected = [
-            sum(abs(r) * p for r, p in step.items()) if len(step) == 2 and 0.0 in step else -1.0
-            for step in known.outcomes[a][:end]
-        ]
-        step = known.outcomes[a][self.component]
-        (reward, chance), *_ = [*((r, p) for r, p in step.items() if r != 0.0), (0.0, 0.0)]
+        expected = {i: abs(reward) * chance for i, (reward, chance) in either.items()}
+        reward, chance = either[self.component]
+        row = undiscounted(moment, self.action)
+        scale = max(abs(moment.q_value(self.action)), float(np.abs(row).max()))
         return (
-            expected.index(max(expected)) == self.component
-            and expected[self.component] > 0.0
+            self.component == max(expected, key=expected.__getitem__)
+            and abs(reward) >= SHARE * scale
+            and expected[self.component] >= NEGLIGIBLE * scale
             and self.verb == verb_of(reward)
             and agrees(self.amount, abs(reward))
             and agrees(self.chance, chance)

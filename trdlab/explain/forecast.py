@@ -5,16 +5,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trdlab.explain.chances import chances, likelihood
+from trdlab.explain.chances import chances, likelihood, one_or_nothing
 from trdlab.explain.finding import Finding, agrees, one_sign
 from trdlab.explain.limits import doubtful, explicit_end
 from trdlab.explain.moment import Moment
-from trdlab.explain.rhythm import effect_of, largest, regular, stands_out, steady, undiscounted
+from trdlab.explain.rhythm import (
+    Rhythm,
+    effect_of,
+    largest,
+    regular,
+    stands_out,
+    steady,
+    undiscounted,
+)
 
 _MATTERS = 0.5
 """An error is told that is at least this share of what is expected."""
 
-_TOO_LITTLE = 0.005  # of an action's value, to tell that it lies beyond
+_TOO_LITTLE = 0.05  # of an action's value, to tell that it lies beyond
 
 
 def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
@@ -37,12 +45,15 @@ def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
     if not row[:end].any():
         return (*_nothing(moment, action), *chances(moment, action))
     always = steady(moment, action)
+    when = tuple(_when(moment, action)) if always is None else (always,)
+    is_regular = always is not None or any(isinstance(x, Rhythm) for x in when)
+    named = {x.component for x in when if isinstance(x, FirstChance)}
     return (
-        *([always] if always is not None else _when(moment, action)),
+        *when,
         *_accuracy(moment, action),
         *_beyond(moment, action),
-        *(_centre(moment, action) if always is None else ()),
-        *chances(moment, action),
+        *(() if is_regular else _centre(moment, action)),
+        *chances(moment, action, named),
     )
 
 
@@ -68,11 +79,15 @@ def _nothing(moment: Moment, action: str) -> tuple[Finding, ...]:
 def _firsts(moment: Moment, action: str) -> Iterator["FirstReward"]:
     """Yields the first reward and the first cost, the earlier one first."""
     row, notable = undiscounted(moment, action), stands_out(moment, action)
+    either = one_or_nothing(moment, action)
     places = [np.flatnonzero(notable & (sign * row > 0.0)) for sign in (1.0, -1.0)]
     for i in sorted(int(place[0]) for place in places if place.size):
         discounted = float(moment.components(action)[i])
         effect = _effect(moment, action, i)
-        if moment.time_axis.width == 1:
+        if i in either:
+            reward, chance = either[i]
+            yield FirstChance(action, effect, i, discounted, abs(reward), chance)
+        elif moment.time_axis.width == 1:
             yield FirstStepReward(action, effect, i, discounted, float(row[i]))
         else:
             yield FirstReward(action, effect, i, discounted)
@@ -114,8 +129,11 @@ def _beyond(moment: Moment, action: str) -> Iterator[Finding]:
 def _centre(moment: Moment, action: str) -> Iterator[Finding]:
     end = explicit_end(moment, action)
     explicit = moment.components(action)[:end]
-    if one_sign(explicit) and np.count_nonzero(explicit) > 1 and moment.time_axis.width == 1:
-        yield CentreOfMass(action, end, float(explicit @ np.arange(end) / explicit.sum()))
+    if one_sign(explicit):
+        step = float(explicit @ np.arange(end) / explicit.sum())
+        centre = CentreOfMass(action, end, effect_of(explicit.sum()), step)
+        if centre.holds(moment):
+            yield centre
 
 
 @dataclass(eq=False, repr=False)
@@ -206,6 +224,23 @@ class FirstStepReward(FirstReward):
 
 
 @dataclass(eq=False, repr=False)
+class FirstChance(FirstReward):
+    """The same where that step pays, or costs, one amount or nothing."""
+
+    amount: float
+    chance: float
+
+    def holds(self, moment: Moment) -> bool:
+        reward, chance = one_or_nothing(moment, self.action).get(self.component, (0.0, 0.0))
+        return (
+            chance > 0.0
+            and super().holds(moment)
+            and agrees(self.amount, abs(reward))
+            and agrees(self.chance, chance)
+        )
+
+
+@dataclass(eq=False, repr=False)
 class OffBy(Finding):
     """What forecasts of an action's largest component are off by: the root mean square."""
 
@@ -223,18 +258,26 @@ class OffBy(Finding):
 
 @dataclass(eq=False, repr=False)
 class CentreOfMass(Finding):
-    """The mean step of an action's rewards before `end`, weighted by amount; w = 1, one sign."""
+    """The mean step of an action's rewards before `end`, weighted by what they are worth now.
+
+    There are several that stand out, w = 1, and all have one sign.
+    """
 
     action: str
     end: int
+    effect: str
     step: float
 
     def holds(self, moment: Moment) -> bool:
         explicit = moment.components(self.action)[: self.end]
-        is_defined = moment.time_axis.width == 1 and one_sign(explicit)
-        if self.end != explicit_end(moment, self.action) or not is_defined:
+        if self.end != explicit_end(moment, self.action) or not one_sign(explicit):
             return False
-        return agrees(self.step, float(explicit @ np.arange(self.end) / explicit.sum()))
+        return (
+            moment.time_axis.width == 1
+            and int(np.count_nonzero(stands_out(moment, self.action))) > 1
+            and self.effect == effect_of(explicit.sum())
+            and agrees(self.step, float(explicit @ np.arange(self.end) / explicit.sum()))
+        )
 
 
 @dataclass(eq=False, repr=False)

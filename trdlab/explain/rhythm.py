@@ -75,21 +75,26 @@ def peaks(moment: Moment, action: str) -> list[int]:
 
 
 def stands_out(moment: Moment, action: str) -> BoolArray:
-    """Returns `[K]`: which of the trusted explicit components are more than noise.
+    """Returns `[K]`: which of the trusted explicit components are more than noise (see `least`)."""
+    size = np.abs(undiscounted(moment, action))
+    return np.asarray((size > 0.0) & (size >= least(moment, action)))
 
-    Of what was learned those are at least `SHARE` of the largest. Of an exact table, which has no
-    noise, they are at least `NEGLIGIBLE` of the largest, or of the reward that would be worth the
+
+def least(moment: Moment, action: str) -> float:
+    """Returns the least that stands out at a step, without its discount.
+
+    Of what was learned that is `SHARE` of the largest that is expected. Of an exact table, which
+    has no noise, it is `NEGLIGIBLE` of the largest, or of the reward that would be worth the
     residual if every later step paid it.
     """
-    row, axis = undiscounted(moment, action), moment.time_axis
-    size = np.abs(row)
-    largest = float(size.max(initial=0.0))
+    axis = moment.time_axis
+    largest = float(np.abs(undiscounted(moment, action)).max(initial=0.0))
     if not moment.is_exact:
-        return np.asarray((size > 0.0) & (size >= SHARE * largest))
+        return SHARE * largest
     later = abs(float(moment.components(action)[-1])) * (1.0 - axis.gamma**axis.width)
     begins = float(axis.discounts[-1])
     rate = later / begins if begins >= LEAST_DISCOUNT else 0.0
-    return np.asarray((size > 0.0) & (size >= NEGLIGIBLE * max(largest, rate)))
+    return NEGLIGIBLE * max(largest, rate)
 
 
 def largest(moment: Moment, action: str) -> int:
@@ -110,18 +115,20 @@ def regular(moment: Moment, action: str, named: Collection[int] = ()) -> tuple[F
     Args:
         moment: the decompositions of every action.
         action: the name of one of which something is expected.
-        named: components of which it need not be said that they are the largest.
+        named: components that have been told of; if one is about the largest, that is not said.
     """
     found, end, at = peaks(moment, action), explicit_end(moment, action), largest(moment, action)
     what = effect_of(undiscounted(moment, action)[at])
     claims: list[Finding] = []
     if len(found) > 1:
-        period = round(float(np.diff(found).mean()) * moment.time_axis.width)
-        claims.append(Rhythm(action, end, what, period, found[0], found[-1]))
+        claims.append(Rhythm(action, end, what, _period(moment, found), found[0], found[-1]))
     if not any(claim.holds(moment) for claim in claims):
-        if at not in named:
+        sizes = np.abs(_shares(moment, action))
+        if not any(sizes[i] >= 1.0 - ALIKE for i in named):
             claims.append(Peak(action, end, what, at, float(moment.components(action)[at])))
-        claims.append(Peaks(action, end, what, _clearest(moment, action, found)))
+        row = moment.components(action)
+        named_peaks = tuple((i, float(row[i])) for i in _clearest(moment, action, found))
+        claims.append(Peaks(action, end, what, named_peaks))
     if found:
         shares = _shares(moment, action)
         highest = max(found, key=lambda i: shares[i])
@@ -155,6 +162,12 @@ def _clearest(moment: Moment, action: str, found: list[int]) -> tuple[int, ...]:
     shares = _shares(moment, action)
     order = sorted(found, key=lambda i: -prominence(shares, i))
     return tuple(sorted(order[:MOST_PEAKS]))
+
+
+def _period(moment: Moment, found: list[int]) -> tuple[int, int]:
+    """Returns the smallest and the largest spacing of peaks, in steps."""
+    spacings = np.diff(found) * moment.time_axis.width
+    return int(spacings.min()), int(spacings.max())
 
 
 def _flanks(shares: FloatArray, peak: int) -> tuple[int, int]:
@@ -220,19 +233,20 @@ class Peak(Finding):
 
 @dataclass(eq=False, repr=False)
 class Peaks(Finding):
-    """The most prominent of several peaks."""
+    """The most prominent of several peaks: their components, and what each is worth now."""
 
     action: str
     end: int
     effect: str
-    components: tuple[int, ...]
+    peaks: tuple[tuple[int, float], ...]
 
     def holds(self, moment: Moment) -> bool:
-        found = peaks(moment, self.action)
+        found, row = peaks(moment, self.action), moment.components(self.action)
         return (
             self.end == explicit_end(moment, self.action)
             and len(found) > 1
-            and self.components == _clearest(moment, self.action, found)
+            and tuple(i for i, _ in self.peaks) == _clearest(moment, self.action, found)
+            and all(agrees(worth, float(row[i])) for i, worth in self.peaks)
             and self.effect == _effect(moment, self.action)
         )
 
@@ -241,14 +255,15 @@ class Peaks(Finding):
 class Rhythm(Finding):
     """Three or more peaks whose spacings are nearly equal: each is within `UNEVEN` of their mean.
 
-    In an exact table each may also be one component off. Noise has peaks too: of what was learned,
-    and has not been judged, there have to be four.
+    The period is the smallest and the largest of them, in steps. In an exact table each may also be
+    one component off. Noise has peaks too: of what was learned, and has not been judged, there have
+    to be four.
     """
 
     action: str
     end: int
     effect: str
-    period: int
+    period: tuple[int, int]
     first: int
     last: int
 
@@ -262,7 +277,7 @@ class Rhythm(Finding):
         return (
             bool((np.abs(spacings - mean) <= max(UNEVEN * mean, 1.0 * moment.is_exact)).all())
             and (self.first, self.last) == (found[0], found[-1])
-            and self.period == round(mean * moment.time_axis.width)
+            and self.period == _period(moment, found)
             and self.effect == _effect(moment, self.action)
         )
 

@@ -11,6 +11,7 @@ from rich.text import Text
 from trdlab.errors import InputError, closest
 from trdlab.explain.agents import Agent
 from trdlab.explain.assessment import Copying, assess, try_out
+from trdlab.explain.contrast import in_short
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Claim, Finding
 from trdlab.explain.limits import judged
@@ -46,17 +47,6 @@ _FAULTS = (
     "discount-off",
     "goes-on-in-next",
     "goes-on-after-end",
-)
-_MATTERS_MOST = (
-    "equal-values",
-    "better",
-    "better-by-discount",
-    "same-components",
-    "doubtful-difference",
-    "dominates",
-    "more-immediate",
-    "less-costly",
-    "overtakes",
 )
 _OUTCOMES = ("came-in-all", "missed-in-all", "missed-at")
 _NOT_TRIED = "It was not: the states of this environment cannot be copied."
@@ -228,9 +218,7 @@ def summary(explained: Explained) -> list[str]:
         texts += [trust_sentence(finding, report) for finding in shown]
     if explanation is not None:
         texts += _told(explanation.forecast[:_MOST_OF_EACH], explanation)
-        most = [finding for finding in explanation.contrast if finding.kind() in _MATTERS_MOST]
-        most.sort(key=lambda finding: _MATTERS_MOST.index(finding.kind()))
-        texts += _told(most[:_MOST_OF_EACH], explanation)
+        texts += _told(in_short(explanation.contrast), explanation)
     if explained.trial is not None:
         tried = [x for x in trial_findings(explained.trial) if x.kind() in _OUTCOMES]
         texts += [trial_sentence(finding, explained.trial) for finding in tried]

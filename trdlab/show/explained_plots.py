@@ -11,8 +11,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import OutputError
-from trdlab.explain.contrast import difference
 from trdlab.explain.explanation import Explanation
+from trdlab.explain.leads import difference
 from trdlab.explain.limits import doubtful
 from trdlab.explain.moment import Moment
 from trdlab.explain.tried import Trial

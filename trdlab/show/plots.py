@@ -15,7 +15,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.explain.contrast import difference
+from trdlab.explain.leads import difference
 from trdlab.explain.moment import Moment
 from trdlab.files import check_output, write_whole
 from trdlab.formatting import amount, decimals_for, number, plain

@@ -1,17 +1,22 @@
 """Findings about a moment as English sentences, and sentences read back into findings."""
 
+import re
+from collections.abc import Sequence
+
 from trdlab.explain import (
     chances,
     contrast,
     explanation,
     flips,
     forecast,
+    leads,
     limits,
     rhythm,
     worth,
 )
 from trdlab.explain.explanation import Explanation
-from trdlab.explain.finding import Claim, Finding
+from trdlab.explain.finding import Claim, Finding, Shown
+from trdlab.formatting import decimals_for
 from trdlab.show.templates import Form, Language, UnsupportedSentenceError, forms_of
 
 __all__ = ["TEMPLATES", "UnsupportedSentenceError", "check", "sentence", "sentences"]
@@ -22,13 +27,21 @@ TEMPLATES: dict[type[Claim], str] = {
         "In total {more} pays {more_total:amount} and {less} {less_total:amount}."
     ),
     worth.NoTotal: "{action} has no undiscounted total, for its rewards may never end.",
-    contrast.MoreImmediate: (
+    leads.MoreImmediate: (
         "{leader} gives more immediate rewards than {other}: by {last_step:step} they are worth "
         "{leader_sum:value} against {other_sum:value}."
     ),
-    contrast.LessCostly: (
-        "{leader} costs less at first than {other}: by {last_step:step} its rewards are worth "
-        "{leader_sum:value} against {other_sum:value}."
+    leads.PaysMore: (
+        "By {last_step:step} {leader} is expected to have paid more than {other}: worth "
+        "{leader_sum:value} against {other_sum:value} now."
+    ),
+    leads.PaysMoreNet: (
+        "By {last_step:step} {leader} is expected to have paid more than {other}, costs "
+        "subtracted: worth {leader_sum:value} against {other_sum:value} now."
+    ),
+    leads.CostsLess: (
+        "By {last_step:step} {leader} is expected to have cost less than {other}: "
+        "{leader_sum:value} against {other_sum:value} in present worth."
     ),
     contrast.SameComponents: "{action} and {foil} have the same components.",
     contrast.DoubtfulDifference: (
@@ -36,7 +49,7 @@ TEMPLATES: dict[type[Claim], str] = {
         "forecasts have not proved better than a guess."
     ),
     worth.BetterByDiscount: (
-        "Only the discount tells them apart: with γ = {gamma:plain} {better} is worth "
+        "Without the discount both are worth the same; with γ = {gamma:plain} {better} is worth "
         "{better_value:value} and {worse} {worse_value:value}."
     ),
     worth.Better: (
@@ -44,11 +57,15 @@ TEMPLATES: dict[type[Claim], str] = {
         "{worse_value:value}."
     ),
     worth.EqualValues: ("With γ = {gamma:plain} {action} and {foil} are both worth {value:value}."),
-    contrast.Overtakes: (
-        "Counted as they come in, the rewards of {leader} overtake those of {other} at "
-        "{component:when}: {leader_total:value} against {other_total:value}."
+    leads.Overtakes: (
+        "{leader} overtakes {other} at {component:when}: what is expected by then is worth "
+        "{leader_total:value} against {other_total:value} now."
     ),
-    contrast.StaysAhead: "{other} never catches up with {leader}.",
+    leads.MakesUp: (
+        "What comes at {component:label} makes up for the lead of {other}: it is worth "
+        "{more:value} more after {leader}."
+    ),
+    leads.StaysAhead: "{other} never catches up with {leader}.",
     contrast.Dominates: "Nothing speaks for {worse}: no component is larger than that of {better}.",
     contrast.Reasons: (
         "To prefer {better} it is enough to look at {components:labels}: {advantage:value} more "
@@ -76,6 +93,11 @@ TEMPLATES: dict[type[Claim], str] = {
         "The first {effect:effect} to be expected of {action} is that of {component:when}, worth "
         "{discounted:value} now."
     ),
+    forecast.FirstChance: (
+        "The first {effect:effect} to be expected of {action} is that of {component:when}: "
+        "{amount:amount} with a chance of {chance:percent}, and otherwise nothing; worth "
+        "{discounted:value} now."
+    ),
     chances.PutAt: (
         "After {action} the chance of the reward of {reward:amount} at {component:when} is put at "
         "{chance:percent}."
@@ -85,8 +107,8 @@ TEMPLATES: dict[type[Claim], str] = {
         "{mean:amount} on average."
     ),
     rhythm.Rhythm: (
-        "Before {end:begin} the {effect:effect} expected of {action} peaks about every "
-        "{period:period}, from {first:label} to {last:label}."
+        "Before {end:begin} the {effect:effect} expected of {action} peaks every {period:period}, "
+        "from {first:label} to {last:label}."
     ),
     rhythm.Peak: (
         "Before {end:begin} the largest {effect:effect} to be expected of {action} is that of "
@@ -94,7 +116,7 @@ TEMPLATES: dict[type[Claim], str] = {
     ),
     rhythm.Peaks: (
         "Before {end:begin} the {effect:effect} expected of {action} peaks most clearly at "
-        "{components:labels}."
+        "{peaks:peaks}."
     ),
     rhythm.Spread: (
         "Around {component:when} the {effect:effect} expected of {action} is spread over "
@@ -106,20 +128,21 @@ TEMPLATES: dict[type[Claim], str] = {
         "square)."
     ),
     forecast.CentreOfMass: (
-        "Weighted by what they are worth now, the rewards expected of {action} before {end:begin} "
-        "centre on t+{step:value}."
+        "Weighted by what they are worth now, the {effect:effect}s expected of {action} before "
+        "{end:begin} come {step:tenths} steps from now on average."
     ),
     forecast.ShareBeyond: "{share:percent} of the value of {action} lies at {component:label}.",
     chances.GiveOrTake: (
-        "What {action} is worth on average, {value:value}, varies by {deviation:value} from "
-        "episode to episode (one standard deviation)."
+        "{action} is worth {value:value} on average; single episodes differ from that by "
+        "{deviation:value} (one standard deviation)."
     ),
     chances.EitherOr: (
-        "At {component:label} {action} either {verb:text} {amount:amount} or nothing; the chance "
-        "that it does is {chance:percent}."
+        "At {component:label} {action} {verb:text} {amount:amount} with a chance of "
+        "{chance:percent}, and otherwise nothing."
     ),
     chances.LikelyOver: (
-        "After {action} the episode is likely over by {component:begin}: {chance:percent}."
+        "After {action} the episode is more likely over than not by {component:begin} "
+        "({chance:percent})."
     ),
     chances.SurelyOver: "After {action} the episode is over by {component:begin}.",
     limits.TrustedWhole: "All that was tested of such forecasts can be trusted.",
@@ -146,28 +169,63 @@ TEMPLATES: dict[type[Claim], str] = {
     ),
 }
 
+_TENTHS = Form(lambda x, _: f"{x:.1f}", r"\d+\.\d", lambda text: Shown(text, "{:.1f}".format))
 _EFFECT = Form(lambda effect, _: str(effect), r"(?:notable )?(?:reward|cost)", str)
 
 
 def _forms(told: Explanation) -> dict[str, Form]:
     moment = told.moment
-    seconds = moment.seconds_per_step
-    forms = forms_of(moment.time_axis, moment.action_names, seconds)
-    return forms | {"effect": _EFFECT, "period": _period(forms["steps"], seconds)}
+    forms = forms_of(moment.time_axis, moment.action_names, moment.seconds_per_step)
+    return forms | {
+        "effect": _EFFECT,
+        "tenths": _TENTHS,
+        "period": _period(moment.seconds_per_step),
+        "peaks": _peaks(forms["labels"], forms["value"]),
+    }
 
 
-def _period(steps: Form, seconds: float | None) -> Form:
-    """Returns the form of so many steps, with their seconds of play where these are known."""
+def _period(seconds: float | None) -> Form:
+    """Returns the form of a period from so many to so many steps, with its seconds of play."""
 
-    def show(count: int, _: int = 0) -> str:
-        text = steps.show(count, 0)
-        return text if seconds is None else f"{text} ({count * seconds:.2g} s)"
+    def show(period: tuple[int, int], _: int = 0) -> str:
+        text = f"{_from_to([f'{steps}' for steps in period])} steps"
+        if seconds is None:
+            return text
+        return f"{text} ({_from_to([f'{steps * seconds:.2g}' for steps in period])} s)"
 
-    def read_back(text: str) -> int | None:
-        count: int | None = steps.read(text.partition(" (")[0])
-        return count if count is not None and show(count) == text else None
+    def read_back(text: str) -> tuple[int, int] | None:
+        ends = [int(steps) for steps in text.partition(" steps")[0].split(" to ")]
+        period = ends[0], ends[-1]
+        return period if show(period) == text else None
 
-    return Form(show, steps.pattern + r"(?: \(\S+ s\))?", read_back)
+    return Form(show, r"\d+(?: to \d+)? steps(?: \([^)]+ s\))?", read_back)
+
+
+def _from_to(ends: list[str]) -> str:
+    return " to ".join(dict.fromkeys(ends))
+
+
+def _peaks(labels: Form, value: Form) -> Form:
+    """Returns the form of peaks and what each is worth: `t+2 (worth 0.65 now) and t+7 (0.31)`."""
+
+    def text_of(components: Sequence[int], worths: Sequence[str]) -> str:
+        told = iter([f"(worth {worths[0]} now)", *(f"({worth})" for worth in worths[1:])])
+        return re.sub(r"t[^ ,]*", lambda at: f"{at[0]} {next(told)}", labels.show(components, 0))
+
+    def show(peaks: Sequence[tuple[int, float]], _: int) -> str:
+        components, worths = zip(*peaks, strict=True)
+        decimals = decimals_for(worths)
+        return text_of(components, [value.show(worth, decimals) for worth in worths])
+
+    def read_back(text: str) -> tuple[tuple[int, float], ...] | None:
+        components = labels.read(re.sub(r" \([^)]*\)", "", text))
+        worths = re.findall(rf"\((?:worth )?({value.pattern})(?: now)?\)", text)
+        if components is None or len(worths) != len(components):
+            return None
+        peaks = tuple(zip(components, map(value.read, worths), strict=True))
+        return peaks if text_of(components, worths) == text else None
+
+    return Form(show, r"t.*?", read_back)
 
 
 MOMENTS = Language[Explanation](

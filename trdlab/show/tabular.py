@@ -7,8 +7,8 @@ from typing import Any
 
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.arguments import say_arguments
-from trdlab.explain.contrast import difference
 from trdlab.explain.explanation import explain
+from trdlab.explain.leads import difference
 from trdlab.explain.moment import Moment
 from trdlab.explain.tabular import gamma_what_ifs, tabular_moment
 from trdlab.formatting import plain

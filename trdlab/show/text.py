@@ -8,8 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 from trdlab.decomposition import TimeAxis
-from trdlab.explain.contrast import difference
 from trdlab.explain.explanation import Explanation
+from trdlab.explain.leads import difference
 from trdlab.explain.moment import Moment
 from trdlab.formatting import amount, decimals_for, number
 from trdlab.show.sentences import sentence

@@ -51,7 +51,8 @@ CANDIDATES = (
     ),
     Candidate(
         "C",
-        "avoids losses: a single one costs it more than there is to earn",
+        "avoids losses: a single one costs it more than there is to earn; apart from that it heads "
+        "for a reward that comes late",
         {"coin": 0.1, "treasure": 2.0, "hazard": -4.0},
     ),
 )

@@ -28,10 +28,12 @@ _INTRO = (
     "Each trial shows what was printed about one of them at one moment, and asks which one it is. "
     "You see neither the map nor the names of the actions: they are called P, Q, R and S, and what "
     "is P in one trial may be R in another. The same agent may come up several times.",
-    "t is the step taken now, t+3 is three steps later. A reward that is expected later is worth "
-    f"less now: {100 * (1 - TIME_AXIS.gamma):.0f} % less for each step (γ = {TIME_AXIS.gamma:g}). "
-    "A component is what is expected at one step, and the residual what is expected after "
-    f"t+{TIME_AXIS.num_steps - 1}. Numbers are rewards; costs are negative.",
+    f"t is the step taken now, t+3 is three steps later, and {TIME_AXIS.labels[-1]} is all that "
+    f"comes from t+{TIME_AXIS.num_steps} on. Soon is within about three steps, late is after that.",
+    "What is expected is what comes on average: a reward of 1 with a chance of 90 % is 0.90. "
+    "A reward that is expected later is worth less now: "
+    f"{100 * (1 - TIME_AXIS.gamma):.0f} % less for each step (γ = {TIME_AXIS.gamma:g}). "
+    "A cost is a reward below 0.",
 )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trdlab.errors import InputError
+from trdlab.explain.contrast import in_short
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Finding
 from trdlab.explain.tabular import tabular_moment
@@ -21,16 +22,6 @@ from trdlab.study.candidates import (
 
 FEWEST, MOST = 3, 30
 _NAMES = ("action P", "action Q", "action R", "action S")
-_TOLD = (
-    "same-components",
-    "more-immediate",
-    "less-costly",
-    "better",
-    "better-by-discount",
-    "equal-values",
-    "dominates",
-)
-"""What is told of a contrast: which pays sooner, and which is worth more."""
 _MOST_EPISODES = 1_000
 
 
@@ -119,7 +110,7 @@ def _trial(letter: str, state: int, rng: np.random.Generator) -> Trial | None:
         action=action,
         foil=foil,
         promise=_printed(explanation.forecast, explanation),
-        against=_printed((x for x in explanation.contrast if x.kind() in _TOLD), explanation),
+        against=_printed(in_short(explanation.contrast), explanation),
         reason=reason,
     )
 

@@ -133,6 +133,7 @@ def comparisons(draw: st.DrawFn) -> Comparison:
         seed=rng.integers(40, size=count),
         step=np.arange(count),
         different=draw(st.sampled_from([1, 30])),
+        cut=draw(st.sampled_from([0, 0, 7])),
     )
     one, other = draw(st.permutations(range(7)))[:2]
     futures = Future("the optimal policy"), Future("the greedy policy", "sign of each reward")
@@ -145,6 +146,7 @@ def comparisons(draw: st.DrawFn) -> Comparison:
         futures=(futures[0], draw(st.sampled_from(futures))),
         reports=(reports()[one], reports()[other]),
         episodes=draw(st.sampled_from([1, 12])),
+        max_steps=draw(st.sampled_from([1, 1_000])),
         seconds_per_step=draw(st.sampled_from([None, 0.25])),
     )
 

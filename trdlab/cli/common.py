@@ -38,6 +38,15 @@ AGENT = (
     "A run's folder, or RUN@STEP for an older checkpoint; or an exact table: gridworld:NAME, a map "
     "file, or tabular:ENV_ID, with arguments after commas, such as gridworld:ledge,slip=0.2."
 )
+MaxSteps = Annotated[
+    int | None,
+    typer.Option(
+        "--max-steps",
+        min=1,
+        help="After which an episode is cut off, if not before.",
+        show_default="1000, or four horizons",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Show tracebacks.")]
 

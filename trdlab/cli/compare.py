@@ -48,6 +48,7 @@ def compare(
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first episode.")] = 0,
+    max_steps: common.MaxSteps = None,
     as_json: common.AsJson = False,
     out: Annotated[
         Path | None,
@@ -86,7 +87,9 @@ def compare(
         path = picture_path(out)
     errors = Console(stderr=True, highlight=False)
     with EpisodeProgress(errors) as progress:
-        found = two.compare(*agents, episodes=episodes, seed=seed, on_episode=progress.on_episode)
+        found = two.compare(
+            *agents, episodes=episodes, max_steps=max_steps, seed=seed, watch=progress.on_progress
+        )
     if as_json:
         from trdlab.show.comparison_data import comparison_to_dict
 

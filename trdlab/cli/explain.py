@@ -69,6 +69,7 @@ def explain(
             show_default="50, of an exact table 300",
         ),
     ] = None,
+    max_steps: common.MaxSteps = None,
     as_json: common.AsJson = False,
     out: Annotated[
         Path | None,
@@ -123,7 +124,8 @@ def explain(
             action=action,
             foil=foil,
             episodes=episodes,
-            on_episode=progress.on_episode,
+            max_steps=max_steps,
+            watch=progress.on_progress,
         )
     if as_json:
         common.print_json(show.to_dict(explained))

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 if TYPE_CHECKING:
     from trdlab.deep.trainer import Trainer, TrainMetrics
+    from trdlab.explain.playing import Progress as Playing
 
 _LINE_SECONDS = 10.0
 _BAR_SECONDS = 0.1
@@ -107,7 +108,7 @@ class TrainingProgress:
 
 
 class EpisodeProgress:
-    """Shows an evaluation: the episodes that have finished, on a terminal only.
+    """Shows how far episodes are that are played, on a terminal only.
 
     Args:
         console: where to.
@@ -129,3 +130,11 @@ class EpisodeProgress:
         """Shows how many have finished."""
         if self._status is not None:
             self._status.update(f"Evaluating: {finished} episodes have finished")
+
+    def on_progress(self, progress: "Playing") -> None:
+        """Shows how far episodes are that are played to explain an agent."""
+        if self._status is not None:
+            self._status.update(
+                f"Playing {progress.what}: {progress.finished} of {progress.episodes} are over, "
+                f"step {progress.steps:,}"
+            )

@@ -14,14 +14,15 @@ from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
     from trdlab.explain.agents import Agent, find_agent, gridworld_agent, run_agent, tabular_agent
-    from trdlab.explain.assessment import Copying, assess
-    from trdlab.explain.branches import Branches, Branching
+    from trdlab.explain.assessment import assess
+    from trdlab.explain.branches import Branches, Branching, Copying
     from trdlab.explain.comparison.pair import compare, find_pair
     from trdlab.explain.comparison.report import Comparison
     from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
-    from trdlab.explain.counterfactual import Counterfactual, play_to
+    from trdlab.explain.counterfactual import Counterfactual
     from trdlab.explain.episodes import Counting, Episode, collect
     from trdlab.explain.played import Played, play
+    from trdlab.explain.playing import play_to
     from trdlab.explain.revision import Revision, revise
     from trdlab.explain.story import Story, tell
     from trdlab.explain.trust.calibration import Calibration, calibrate
@@ -84,7 +85,7 @@ _HOMES = {
     "compare": "comparison.pair",
     "find_pair": "comparison.pair",
     "Comparison": "comparison.report",
-    "Copying": "assessment",
+    "Copying": "branches",
     "assess": "assessment",
     "Branches": "branches",
     "Branching": "branches",
@@ -94,7 +95,7 @@ _HOMES = {
     "CopyableGymEnvironments": "copies",
     "ModelEnvironments": "copies",
     "Counterfactual": "counterfactual",
-    "play_to": "counterfactual",
+    "play_to": "playing",
     "Counting": "episodes",
     "Episode": "episodes",
     "collect": "episodes",

@@ -11,8 +11,8 @@ from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.explain.counterfactual import play_to
-from trdlab.explain.episodes import AS_PAID, Counting, Policy, decide
+from trdlab.explain.branches import Copying
+from trdlab.explain.episodes import AS_PAID, Counting, Episode, collect
 from trdlab.explain.models import (
     GRIDWORLD,
     TABULAR,
@@ -25,6 +25,7 @@ from trdlab.explain.models import (
 )
 from trdlab.explain.moment import Moment, moment_of
 from trdlab.explain.places import Make, Place, check_fits, find_place, refuse_arguments
+from trdlab.explain.playing import Policy, decide, play_to
 from trdlab.gridworld import map_names
 from trdlab.runs.checkpoint import checkpoint_steps
 from trdlab.runs.folder import RunFolder
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 AXIS = TimeAxis(0.95, 4)
 """Of an exact table, where nothing is said."""
 
+_OF_TABLES, _OF_OTHERS = Copying(episodes=100), Copying()
+_OF_GAMES = Copying(episodes=8, moments=3, copies=2, tries=10)  # a copy plays all of a game again
 _DIGITS = 19  # more are no number of steps
 
 
@@ -55,6 +58,7 @@ class Agent:
         seconds_per_step: how long one of its steps takes as people play, if that is known.
         words: what names it on the command line, and what `make` makes if that is not its own.
         place: the options that name what `make` makes.
+        copying: how much is copied of its states, where nothing else is said.
     """
 
     name: str
@@ -67,6 +71,28 @@ class Agent:
     seconds_per_step: float | None = None
     words: tuple[str, ...] = ()
     place: tuple[str, ...] = ()
+    copying: Copying = _OF_OTHERS
+
+    def play(self, count: int, *, seed: int, **how: Any) -> tuple[Episode, ...]:
+        """Returns episodes that the agent plays, each in an environment of its own.
+
+        Args:
+            count: of the episodes.
+            seed: of the environments, and of the actions.
+            how: as for `collect`.
+        """
+        environments = self.make(count, seed)
+        try:
+            return collect(
+                self.estimator,
+                environments,
+                policy=self.policy,
+                counting=self.counting,
+                seed=seed,
+                **how,
+            )
+        finally:
+            environments.close()
 
     def action(self, name: str) -> str:
         """Returns the name of an action that is given by its name or its number."""
@@ -166,6 +192,7 @@ def _exact_agent(
         world=model.world,
         words=(called, *_axis_words(time_axis), *(() if env is None else place.words)),
         place=place.words,
+        copying=_OF_TABLES,
     )
 
 
@@ -224,7 +251,12 @@ def run_agent(
         seconds_per_step=told["frame_skip"] / per_second if per_second else None,
         words=(f"{path}{at}", *(() if env is None else place.words)),
         place=place.words,
+        copying=_OF_GAMES if _is_atari(settings, env) else _OF_OTHERS,
     )
+
+
+def _is_atari(settings: "TrainSettings", env: str | None) -> bool:
+    return settings.kind == "atari" and (env is None or not is_model(env))
 
 
 def _place(settings: "TrainSettings", env: str | None, env_arguments: Sequence[str]) -> Place:
@@ -233,7 +265,7 @@ def _place(settings: "TrainSettings", env: str | None, env_arguments: Sequence[s
 
     own = (settings.env, settings.env_arg) if env is None else (env, tuple(env_arguments))
     place = find_place(*own, settings.time_axis)
-    if settings.kind != "atari" or is_model(own[0]):
+    if not _is_atari(settings, env):
         return place
     there = replace(settings, env=own[0], env_arg=own[1])
     return Place(lambda num, seed: make_environments(there, num_envs=num, seed=seed), place.words)

@@ -1,17 +1,17 @@
 """Assessing an agent: its episodes are played, and what it expected is judged by what came."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeGuard
+from collections.abc import Sequence
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from trdlab.environments import CopyableEnvironments, Environments, NotCopyable
 from trdlab.errors import InputError
 from trdlab.explain.agents import Agent
-from trdlab.explain.branches import Branches, Branching
-from trdlab.explain.counterfactual import counterfactual, play_to
-from trdlab.explain.episodes import Episode, collect
+from trdlab.explain.branches import Branches, Branching, Copying
+from trdlab.explain.counterfactual import counterfactual
+from trdlab.explain.episodes import Episode
+from trdlab.explain.playing import Watch, play_to, unwatched
 from trdlab.explain.tried import Trial
 from trdlab.explain.trust.intervals import FEWEST_EPISODES
 from trdlab.explain.trust.report import TrustReport, judge
@@ -20,29 +20,15 @@ FOLLOWED = 100
 """Steps for which two actions that are tried are followed at least."""
 
 
-@dataclass(frozen=True)
-class Copying:
-    """How the states of an agent's episodes are copied, for the ceiling.
-
-    Args:
-        episodes: how many are played for it.
-        moments: how many states of each are copied, about.
-        copies: how often each is.
-    """
-
-    episodes: int = 20
-    moments: int = 5
-    copies: int = 8
-
-
 def assess(
     agent: Agent,
     *,
     episodes: int = 50,
     epsilon: float | None = None,
+    max_steps: int | None = None,
     copying: Copying | None = None,
     seed: int = 1000,
-    on_episode: Callable[[int], None] = lambda finished: None,
+    watch: Watch = unwatched,
 ) -> TrustReport:
     """Plays episodes of an agent, and judges what it expected by what came.
 
@@ -54,23 +40,33 @@ def assess(
         agent: whom to judge.
         episodes: how many to play.
         epsilon: the chance of a random action.
+        max_steps: after which an episode is cut off, if not before.
         copying: how states are copied for the ceiling and for foils; without it there are none, nor
             where states cannot be copied.
         seed: of everything.
-        on_episode: called with the number of finished episodes whenever some finish.
+        watch: told how far the episodes are, after every step.
 
     Raises:
         InputError: there is less than one episode, or ε is outside [0, 1).
     """
     if episodes < 1:
         raise InputError(f"There are {episodes} episodes.", "Ask for at least 1.")
+
+    def played_with(chance: float, what: str) -> tuple[Episode, ...]:
+        how: dict[str, Any] = {"epsilon": chance, "max_steps": max_steps, "seed": seed}
+        return agent.play(episodes, **how, watch=watch, what=what)
+
     chance = epsilon or 0.0
-    played = _played(agent, episodes, chance, seed, on_episode)
+    played = played_with(chance, "episodes to judge by")
     if epsilon is None and _different(played) < min(FEWEST_EPISODES, episodes):
         chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
-        played = _played(agent, episodes, chance, seed, on_episode)
+        played = played_with(chance, "episodes with some random actions")
     length = float(np.mean([len(episode) for episode in played]))
-    copied = None if copying is None else _copied(agent, copying, length, chance, seed + 1)
+    copied = None
+    if copying is not None:
+        every = max(1, round(length / copying.moments))
+        how: dict[str, Any] = {"every": every, "epsilon": chance, "max_steps": max_steps}
+        copied = _copied(agent, copying, seed + 1, **how, watch=watch)
     return judge(
         agent.estimator.future,
         played,
@@ -81,7 +77,7 @@ def assess(
 
 
 def try_out(
-    agent: Agent, action: str, foil: str, *, seed: int = 0, step: int = 0, copies: int = 50
+    agent: Agent, action: str, foil: str, *, seed: int = 0, step: int = 0, copies: int | None = None
 ) -> Trial | None:
     """Tries two actions at a step of an agent's episode, each from copies of the state.
 
@@ -94,7 +90,7 @@ def try_out(
         foil: the name of the other.
         seed: of the episode.
         step: of that episode.
-        copies: how often each is tried.
+        copies: how often each is tried, by default as the agent's `copying` says.
 
     Returns:
         What was forecast and what came; None where states cannot be copied.
@@ -104,7 +100,8 @@ def try_out(
     """
     environments = agent.make(1, seed)
     steps = max(FOLLOWED, agent.estimator.time_axis.num_steps)
-    branching = Branching(agent.estimator, agent.policy, agent.counting, copies, steps)
+    tries = agent.copying.tries if copies is None else copies
+    branching = Branching(agent.estimator, agent.policy, agent.counting, tries, steps)
     try:
         if not _can_be_copied(environments):
             return None
@@ -125,24 +122,6 @@ def try_out(
     return Trial(found, agent.action_names, agent.seconds_per_step)
 
 
-def _played(
-    agent: Agent, count: int, epsilon: float, seed: int, on_episode: Callable[[int], None]
-) -> tuple[Episode, ...]:
-    environments = agent.make(count, seed)
-    try:
-        return collect(
-            agent.estimator,
-            environments,
-            policy=agent.policy,
-            counting=agent.counting,
-            epsilon=epsilon,
-            seed=seed,
-            on_episode=on_episode,
-        )
-    finally:
-        environments.close()
-
-
 def _different(episodes: Sequence[Episode]) -> int:
     """Returns how many episodes are not the same as another one."""
     return len(
@@ -154,23 +133,20 @@ def _different(episodes: Sequence[Episode]) -> int:
 
 
 def _copied(
-    agent: Agent, copying: Copying, length: float, epsilon: float, seed: int
+    agent: Agent, copying: Copying, seed: int, **how: Any
 ) -> tuple[Branches, Branches | None] | None:
     """Returns what else could have followed, and what follows foils, if there is another action.
 
     None where states cannot be copied.
     """
     branching = Branching(agent.estimator, agent.policy, agent.counting, copies=copying.copies)
-    every = max(1, round(length / copying.moments))
 
     def along(seed: int, *, foils: bool) -> Branches | None:
         environments = agent.make(copying.episodes, seed)
         try:
             if not _can_be_copied(environments):
                 return None
-            return branching.along(
-                environments, every=every, epsilon=epsilon, seed=seed, foils=foils
-            )
+            return branching.along(environments, seed=seed, foils=foils, **how)
         except NotCopyable:
             return None
         finally:

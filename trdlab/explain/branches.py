@@ -11,7 +11,8 @@ from trdlab.environments import CopyableEnvironments
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.explain.episodes import AS_PAID, Counting, Decision, Policy, decide
+from trdlab.explain.episodes import AS_PAID, Counting
+from trdlab.explain.playing import Playing, Policy, Progress, Watch, decide, unwatched
 from trdlab.explain.trust.followed import Samples
 
 
@@ -58,6 +59,23 @@ class Branches:
 
 
 @dataclass(frozen=True)
+class Copying:
+    """How much is copied of the states of an agent.
+
+    Args:
+        episodes: how many are played for the ceiling.
+        moments: how many states of each are copied, about.
+        copies: how often each is.
+        tries: how often each of two actions is tried at a state.
+    """
+
+    episodes: int = 20
+    moments: int = 5
+    copies: int = 8
+    tries: int = 50
+
+
+@dataclass(frozen=True)
 class Branching:
     """How moments are copied and continued.
 
@@ -95,8 +113,10 @@ class Branching:
         *,
         every: int,
         epsilon: float = 0.0,
+        max_steps: int | None = None,
         seed: int = 0,
         foils: bool = False,
+        watch: Watch = unwatched,
     ) -> Branches:
         """Plays one episode in each environment, and continues every so manieth moment n times.
 
@@ -108,17 +128,18 @@ class Branching:
             every: the steps from one moment to the next.
             epsilon: the chance of a random action in the episodes, as in `collect`; after its first
                 action a copy follows the policy alone.
+            max_steps: after which an episode is cut off; its copies go on.
             seed: of the actions, the moments and the copies.
             foils: whether each copy begins with an action other than the policy's, drawn evenly.
+            watch: told how far the episodes are, after every step.
         """
         rng, count = np.random.default_rng(seed), environments.num_envs
-        phase, age = rng.integers(every, size=count), 0
-        stack = FrameStack(environments.reset(), environments.stack, environments.padding)
-        running, found = np.ones(count, dtype=np.bool_), []
-        while running.any():
-            decision = decide(self.estimator, stack.observations[running], self.policy)
-            actions = np.zeros(count, dtype=np.int64)
-            actions[running] = decision.draw(rng)
+        phase, found = rng.integers(every, size=count), []
+        playing = self._playing(environments, rng, max_steps=max_steps)
+        what = "episodes with copies of first actions" if foils else "episodes with copies"
+        while playing.running.any():
+            running, age = playing.running, playing.steps
+            decision, actions = playing.decide()
             own = actions.copy()
             random = running & (rng.random(count) < epsilon)
             actions[random] = rng.integers(environments.num_actions, size=int(random.sum()))
@@ -126,12 +147,10 @@ class Branching:
             if due.any():
                 here = decision.decomposition.components[due[running]]  # [M′, A, N+1]
                 first = _others(own[due], environments.num_actions, rng) if foils else actions[due]
-                moments = np.flatnonzero(due)
+                moments, stack = np.flatnonzero(due), playing.stack
                 found.append(self._continued(environments, stack, moments, first, age, here, rng))
-            step = environments.step(actions)
-            stack.push(step.following, step.ended)
-            running &= ~step.ended
-            age += 1
+            playing.take(actions)
+            watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
         return self._joined(found, count)
 
     def at(
@@ -205,21 +224,23 @@ class Branching:
         count = branch.num_envs
         length = self.steps or self.estimator.time_axis.num_steps
         rewards, ended = np.zeros((count, length)), np.full(count, -1)
-        running = np.ones(count, dtype=np.bool_)
-        for t in range(length):
-            step = branch.step(actions)
+        playing = self._playing(branch, rng, max_steps=length, stack=stack)
+        while playing.running.any():
+            running, t = playing.running, playing.steps
+            if t > 0:
+                _, actions = playing.decide()
+            step = playing.take(actions)
             rewards[running, t] = self.counting.count(step.rewards)[running]
             end = running & self.counting.ends(step)
             ended[end] = t + 1
-            rewards[running & step.truncated, t + 1 :] = np.nan
-            running &= ~(end | step.truncated)
-            if not running.any() or t + 1 == length:
-                break
-            stack.push(step.following, step.ended)
-            decision: Decision = decide(self.estimator, stack.observations[running], self.policy)
-            actions = np.zeros(count, dtype=np.int64)
-            actions[running] = decision.draw(rng)
+            rewards[running & step.truncated & ~end, t + 1 :] = np.nan
+            playing.running &= ~end
         return rewards, ended
+
+    def _playing(
+        self, environments: CopyableEnvironments, rng: np.random.Generator, **how: Any
+    ) -> Playing:
+        return Playing(self.estimator, environments, rng, policy=self.policy, **how)
 
     def _joined(self, found: list[Branches], num_episodes: int) -> Branches:
         """Returns the moments of all times, in the order of their episodes."""

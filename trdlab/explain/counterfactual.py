@@ -6,12 +6,10 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.environments import CopyableEnvironments, Environments
+from trdlab.environments import CopyableEnvironments
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
-from trdlab.estimator import Estimator
 from trdlab.explain.branches import Branches, Branching
-from trdlab.explain.episodes import Policy, decide
 from trdlab.explain.trust.intervals import LEVEL, RESAMPLES, Estimates, draws, percentiles
 
 
@@ -101,40 +99,9 @@ def counterfactual(
     )
 
 
-def play_to(
-    estimator: Estimator,
-    environments: Environments,
-    steps: int,
-    *,
-    policy: Policy | None = None,
-    seed: int = 0,
-) -> FrameStack:
-    """Plays the first environment for some steps, and returns what the agent then sees.
-
-    Args:
-        estimator: whose policy is followed.
-        environments: they are reset.
-        steps: how many steps to take.
-        policy: what the estimator describes, where that is not its own greedy policy.
-        seed: of the policy's draws.
-
-    Raises:
-        InputError: the episode is over by then.
-    """
-    rng = np.random.default_rng(seed)
-    stack = FrameStack(environments.reset(), environments.stack, environments.padding)
-    for taken in range(steps):
-        step = environments.step(decide(estimator, stack.observations, policy).draw(rng))
-        if step.ended[0]:
-            raise InputError(
-                f"There is no step {steps}: the episode is over after {taken + 1} steps.",
-                f"Choose a step from 0 to {taken}.",
-            )
-        stack.push(step.following, step.ended)
-    return stack
-
-
 def _futures(branches: Branches, whole: bool) -> FloatArray:
     """Returns `[n, N+2]`: every component of what followed, and their sum; NaN if not known."""
     observed = np.where(branches.known[0], branches.observed[0], np.nan)  # [n, N+1]
+    if not whole and branches.time_axis.horizon == 0:
+        return np.column_stack([observed, observed])  # the sum of nothing that was seen is no 0
     return np.column_stack([observed, (observed if whole else observed[:, :-1]).sum(axis=1)])

@@ -1,6 +1,5 @@
 """Episodes: what an agent predicted at every step, and what then happened."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,12 +8,9 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Environments, Step
-from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-
-Policy = Callable[[Any], FloatArray]
-"""From observations `[B, ...]` to action probabilities `[B, A]`."""
+from trdlab.explain.playing import Playing, Policy, Progress, Watch, unwatched
 
 
 @dataclass(frozen=True)
@@ -89,48 +85,6 @@ class Episode:
         return np.asarray(self.decomposition.components[np.arange(len(self)), self.actions])
 
 
-@dataclass(frozen=True, eq=False)
-class Decision:
-    """What an agent expects at B observations, and how likely it takes each action.
-
-    Args:
-        decomposition: `[B, A, N+1]`.
-        probabilities: `[B, A]`.
-    """
-
-    decomposition: RewardDecomposition
-    probabilities: FloatArray
-
-    @property
-    def expected(self) -> FloatArray:
-        """`[B, N+1]`: the mean over the policy's actions."""
-        weights = self.probabilities[:, None]  # [B, 1, A]
-        return np.asarray((weights @ self.decomposition.components)[:, 0])
-
-    def draw(self, rng: np.random.Generator) -> IntArray:
-        """Returns `[B]`: an action of the policy each."""
-        cumulative = self.probabilities.cumsum(axis=1)
-        level = rng.random(len(cumulative)) * cumulative[:, -1]  # the last may not be quite 1
-        return np.asarray((cumulative <= level[:, None]).sum(axis=1))
-
-
-def decide(estimator: Estimator, observations: Any, policy: Policy | None = None) -> Decision:
-    """Returns what an estimator expects, and what the policy it describes does.
-
-    Args:
-        estimator: whatever decomposes.
-        observations: `[B, ...]`.
-        policy: the given policy that the estimator describes; without one, the action of largest
-            Σ components, of equals the first.
-    """
-    decomposition = estimator.decompose(observations)  # [B, A, N+1]
-    if policy is not None:
-        return Decision(decomposition, policy(observations))
-    value = decomposition.value  # [B, A]
-    greedy = value.argmax(axis=1)[:, None] == np.arange(value.shape[1])
-    return Decision(decomposition, greedy.astype(value.dtype))
-
-
 def collect(
     estimator: Estimator,
     environments: Environments,
@@ -138,8 +92,10 @@ def collect(
     policy: Policy | None = None,
     counting: Counting = AS_PAID,
     epsilon: float = 0.0,
+    max_steps: int | None = None,
     seed: int = 0,
-    on_episode: Callable[[int], None] = lambda finished: None,
+    watch: Watch = unwatched,
+    what: str = "episodes",
 ) -> tuple[Episode, ...]:
     """Plays one episode in each environment, by the policy that the estimator describes.
 
@@ -150,46 +106,46 @@ def collect(
         counting: which rewards it counts, and what ends its future.
         epsilon: the chance of a random action instead. Random actions lead to more states; what
             follows one is not held against what was predicted before it.
+        max_steps: after which an episode is truncated, if the environment has not ended it before;
+            it is a `time_limit` like that of an environment.
         seed: of the actions; those of the policy are drawn as `play_to` draws them, so that with
             ε = 0 a lone episode is the same there.
-        on_episode: called with the number of finished episodes whenever some finish.
+        watch: told how far the episodes are, after every step.
+        what: they are called then.
 
     Returns:
         E episodes, in the order of the environments.
 
     Raises:
-        InputError: ε is outside [0, 1).
+        InputError: ε is outside [0, 1), or there is not a single step.
     """
     if not 0.0 <= epsilon < 1.0:
         raise InputError(f"ε is {epsilon}.", "It must be at least 0 and less than 1.")
+    if max_steps is not None and max_steps < 1:
+        raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
     rng, chance = np.random.default_rng(seed), np.random.default_rng([seed, 1])
     count = environments.num_envs
     logs: list[list[tuple[Any, ...]]] = [[] for _ in range(count)]
     last, terminated = [np.zeros(0)] * count, np.zeros(count, dtype=np.bool_)
-    stack = FrameStack(environments.reset(), environments.stack, environments.padding)
-    running = np.ones(count, dtype=np.bool_)
-    while running.any():
-        decision = decide(estimator, stack.observations[running], policy)
-        actions = np.zeros(count, dtype=np.int64)
-        actions[running] = decision.draw(rng)
+    playing = Playing(estimator, environments, rng, policy=policy, max_steps=max_steps)
+    while playing.running.any():
+        running = playing.running
+        decision, actions = playing.decide()
         random = running & (chance.random(count) < epsilon)
         actions[random] = chance.integers(environments.num_actions, size=int(random.sum()))
-        step = environments.step(actions)
+        step = playing.take(actions)
         happened = (actions, counting.count(step.rewards), step.life_lost, counting.ends(step))
         seen = zip(decision.decomposition.components, decision.expected, strict=True)
         for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
             logs[env].append((*expectations, *(part[env] for part in happened), random[env]))
-        finish = running & step.ended
-        if finish.any():
-            final = decide(estimator, last_observations(stack, step, finish), policy).expected
-            for env, expected in zip(np.flatnonzero(finish), final, strict=True):
+        if playing.finished.any():
+            final = playing.at_last().expected
+            for env, expected in zip(np.flatnonzero(playing.finished), final, strict=True):
                 last[env] = expected
-            terminated |= finish & step.terminated
-        stack.push(step.following, step.ended)
-        running &= ~step.ended
-        if finish.any():
-            on_episode(int(count - running.sum()))
+            terminated |= playing.finished & step.terminated
+        watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
     coins = chance.random((count, estimator.time_axis.num_steps)) < epsilon  # [E, N·w]
+    limits = [x for x in (environments.time_limit, max_steps) if x is not None]
     return tuple(
         _episode(
             log,
@@ -198,24 +154,10 @@ def collect(
             time_axis=estimator.time_axis,
             terminated=bool(terminated[env]),
             epsilon=epsilon,
-            time_limit=environments.time_limit,
+            time_limit=min(limits, default=None),
         )
         for env, log in enumerate(logs)
     )
-
-
-def last_observations(stack: FrameStack, step: Step, where: BoolArray) -> Any:
-    """Returns `[≤ B, ...]`: the true last observations of the episodes that end `where [B]`.
-
-    Args:
-        stack: what was seen before the step.
-        step: what it led to.
-        where: `[B]`.
-    """
-    frames = step.frames[where]
-    if stack.size is None:
-        return frames
-    return np.concatenate([stack.frames[where, 1:], frames[:, None]], axis=1)
 
 
 def _episode(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trdlab.explain.agents import Agent
-from trdlab.explain.episodes import Episode, collect
+from trdlab.explain.episodes import Episode
 from trdlab.explain.finding import Claim
 from trdlab.explain.revision import Revision, revise
 
@@ -60,22 +60,13 @@ class StoryClaim(Claim):
         raise NotImplementedError
 
 
-def play(agent: Agent, seed: int = 0) -> Played:
+def play(agent: Agent, seed: int = 0, *, max_steps: int | None = None) -> Played:
     """Returns an episode that an agent's policy plays, without any random actions of ours.
 
     Args:
         agent: who plays.
         seed: of the episode.
+        max_steps: after which it is cut off, if not before.
     """
-    environments = agent.make(1, seed)
-    try:
-        (episode,) = collect(
-            agent.estimator,
-            environments,
-            policy=agent.policy,
-            counting=agent.counting,
-            seed=seed,
-        )
-    finally:
-        environments.close()
+    (episode,) = agent.play(1, seed=seed, max_steps=max_steps)
     return Played(episode, agent.action_names, agent.seconds_per_step)

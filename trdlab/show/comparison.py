@@ -105,6 +105,7 @@ TEMPLATES: dict[type[Claim], str] = {
         "They were compared at {states:count} states: one half from {episodes:episodes} that A "
         "played, one half from as many that B played."
     ),
+    background.SomeCutOff: "Cut off after {steps:steps} each: {episodes:episodes}.",
     background.AllAlike: (
         "Different episodes among these: {different:count}, too few to tell of others."
     ),
@@ -142,7 +143,13 @@ def check_comparison(text: str, comparison: Comparison) -> list[Claim]:
 
 # ---- for people ---------------------------------------------------------------------------------
 
-_BENEATH = ("each-tells", "one-tells", "compared-at", "all-alike")  # what the rest stands on
+_BENEATH = (
+    "each-tells",
+    "one-tells",
+    "compared-at",
+    "some-cut-off",
+    "all-alike",
+)  # what the rest stands on
 _IN_DETAIL = ("furthest-apart",)  # told below
 
 

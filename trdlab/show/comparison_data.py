@@ -1,18 +1,13 @@
 """A comparison of two agents as plain data, for JSON."""
 
-import math
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
-from trdlab.arrays import FloatArray
 from trdlab.explain.comparison.findings import comparison_findings
 from trdlab.explain.comparison.report import SIDES, Comparison
 from trdlab.explain.trust.intervals import Estimates
 from trdlab.show.comparison import FURTHEST, LANGUAGE, explain_command
-from trdlab.show.trust_data import trust_to_dict
-from trdlab.statistics import Estimate
+from trdlab.show.trust_data import plain_data, trust_to_dict
 
 SCHEMA = "trdlab.compare/1"
 
@@ -31,24 +26,27 @@ def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
                 "name": comparison.names[i],
                 "words": list(comparison.words[i]),
                 "future": asdict(comparison.futures[i]),
-                "mean": _plain(_of_side(comparison.means, i)),
+                "mean": plain_data(_of_side(comparison.means, i)),
             }
             for i, side in enumerate(SIDES)
         },
         "place": list(comparison.place),
+        "seconds_per_step": comparison.seconds_per_step,
+        "max_steps": comparison.max_steps,
         "time_axis": {**asdict(axis), "labels": axis.labels},
         "episodes": comparison.episodes,
         "different_episodes": visits.different,
+        "cut_off": visits.cut,
         "states": len(visits),
-        "difference": _plain(comparison.difference),
-        "apart": _plain(comparison.apart),
-        "of_any_action": _plain(comparison.of_any_action),
-        "gap": _plain(comparison.gap),
-        "shift": _plain(comparison.shift),
-        "agreement": _plain(comparison.agreement),
+        "difference": plain_data(comparison.difference),
+        "apart": plain_data(comparison.apart),
+        "of_any_action": plain_data(comparison.of_any_action),
+        "gap": plain_data(comparison.gap),
+        "shift": plain_data(comparison.shift),
+        "agreement": plain_data(comparison.agreement),
         "furthest": [_furthest(comparison, m) for m in visits.furthest(FURTHEST)],
         "findings": [
-            finding.to_dict() | {"sentence": LANGUAGE.say(finding, comparison)}
+            plain_data(finding.to_dict()) | {"sentence": LANGUAGE.say(finding, comparison)}
             for finding in comparison_findings(comparison)
         ],
         "calibration": {
@@ -78,13 +76,3 @@ def _furthest(comparison: Comparison, m: int) -> dict[str, Any]:
 
 def _of_side(means: Estimates, side: int) -> Estimates:
     return Estimates(means.value[side], means.low[side], means.high[side])
-
-
-def _plain(found: Estimates | Estimate) -> dict[str, Any]:
-    return {name: _finite(getattr(found, name)) for name in ("value", "low", "high")}
-
-
-def _finite(numbers: FloatArray | float) -> Any:
-    if isinstance(numbers, np.ndarray):
-        return [_finite(float(x)) for x in numbers]
-    return numbers if math.isfinite(numbers) else None

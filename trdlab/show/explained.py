@@ -1,6 +1,6 @@
 """An agent explained: what it expects at a moment, how far to trust that; as text or plain data."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
@@ -10,12 +10,13 @@ from rich.text import Text
 
 from trdlab.errors import InputError, closest
 from trdlab.explain.agents import Agent
-from trdlab.explain.assessment import Copying, assess, try_out
+from trdlab.explain.assessment import assess, try_out
 from trdlab.explain.contrast import in_short
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Claim, Finding
 from trdlab.explain.limits import judged
 from trdlab.explain.played import play
+from trdlab.explain.playing import Watch, unwatched, usual_limit
 from trdlab.explain.story import Story, tell
 from trdlab.explain.tried import Trial, trial_findings
 from trdlab.explain.trust.findings import trust_findings
@@ -67,6 +68,7 @@ class Explained:
         trial: what came of action and foil where they were tried; None where they were not, or
             where states cannot be copied.
         story: of the whole episode; None where it was not asked for.
+        max_steps: after which episodes were cut off, if not before; None for never.
     """
 
     agent: Agent
@@ -77,6 +79,7 @@ class Explained:
     report: TrustReport | None
     trial: Trial | None = None
     story: Story | None = None
+    max_steps: int | None = None
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -109,7 +112,8 @@ def explain_agent(
     action: str | None = None,
     foil: str | None = None,
     episodes: int | None = None,
-    on_episode: Callable[[int], None] = lambda finished: None,
+    max_steps: int | None = None,
+    watch: Watch = unwatched,
 ) -> Explained:
     """Explains an agent at a step of an episode of its own, and judges it by other episodes.
 
@@ -122,13 +126,21 @@ def explain_agent(
         foil: of the one to contrast it with, by default the best other one.
         episodes: by how many the forecasts are judged, 0 for not at all; by default 300 of an exact
             table and 50 of another agent.
-        on_episode: called with the number of finished episodes whenever some finish.
+        max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
+            says, and no sooner than the step that is explained.
+        watch: told how far the episodes are, after every step.
 
     Raises:
         InputError: the episode has no such step, there is no such action, or no episode to judge
             by where calibration was asked for.
     """
     wanted = parts or PARTS
+    if max_steps is not None and step >= max_steps:
+        raise InputError(
+            f"There is no step {step} in {max_steps} steps.", "Choose another --max-steps."
+        )
+    limit = max(usual_limit(agent.estimator.time_axis), step + 1)
+    limit = limit if max_steps is None else max_steps
     is_of_moment = any(_FIELDS[part] for part in wanted)
     moment = agent.moment(seed=seed, step=step) if is_of_moment else None
     chosen = None if action is None else agent.action(action)
@@ -139,19 +151,19 @@ def explain_agent(
     count = (50 if agent.world is None else 300) if episodes is None else episodes
     if "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for --episodes 50.")
-    told = tell(play(agent, seed)) if "episode" in wanted else None
+    told = tell(play(agent, seed, max_steps=limit)) if "episode" in wanted else None
     copied = "calibration" in wanted or "contrast" in wanted
-    copying = (Copying() if agent.world is None else Copying(episodes=100)) if copied else None
-    report = (
-        assess(agent, episodes=count, copying=copying, on_episode=on_episode) if count else None
-    )
+    copying = agent.copying if copied else None
+    report = None
+    if count:
+        report = assess(agent, episodes=count, max_steps=limit, copying=copying, watch=watch)
     explanation = None
     if moment is not None and pair is not None:
         explanation = explain(moment if report is None else judged(moment, report), *pair)
     trial = None
     if pair is not None and pair[1] is not None and "contrast" in wanted:
         trial = try_out(agent, pair[0], pair[1], seed=seed, step=step)
-    return Explained(agent, parts, seed, step, explanation, report, trial, told)
+    return Explained(agent, parts, seed, step, explanation, report, trial, told, limit)
 
 
 def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
@@ -259,10 +271,13 @@ def to_dict(explained: Explained) -> dict[str, Any]:
             "seed": explained.seed,
             "step": explained.step,
             "actions": actions_to_dict(explanation.moment),
+            "error": plain_data(explanation.moment.error),
+            "foil_error": plain_data(explanation.moment.foil_error),
+            "only_reward": plain_data(explanation.moment.only_reward),
             "action": explanation.action,
             "foil": explanation.foil,
             "findings": [
-                finding.to_dict() | {"sentence": sentence(finding, explanation)}
+                plain_data(finding.to_dict()) | {"sentence": sentence(finding, explanation)}
                 for field in _fields(explained)
                 for finding in getattr(explanation, field)
             ],
@@ -270,6 +285,8 @@ def to_dict(explained: Explained) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "agent": explained.agent.name,
+        "seconds_per_step": explained.agent.seconds_per_step,
+        "max_steps": explained.max_steps,
         "time_axis": {**asdict(axis), "labels": axis.labels},
         "future": asdict(explained.agent.estimator.future),
         "summary": summary(explained),
@@ -320,7 +337,19 @@ def _setting(explained: Explained) -> str:
     seconds = explained.agent.seconds_per_step
     if seconds is not None:
         words.append(f"a step is {seconds:.2g} s of play")
+    if _is_cut_off(explained):
+        words.append(f"episodes are cut off after {explained.max_steps:,} steps")
     return " · ".join(words)
+
+
+def _is_cut_off(explained: Explained) -> bool:
+    """Returns whether an episode was cut off by us, and not by a limit of its environment."""
+    report, told, limit = explained.report, explained.story, explained.max_steps
+    cut = report is not None and report.endings.truncated > 0
+    if told is None:
+        return limit is not None and cut
+    episode = told.played.episode
+    return episode.time_limit == limit and (cut or not episode.terminated)
 
 
 def _whose(explained: Explained) -> str:

@@ -15,6 +15,7 @@ from trdlab.explain.comparison.findings import comparison_findings
 from trdlab.explain.comparison.pair import compare, find_pair
 from trdlab.explain.comparison.report import Comparison, centre, compared
 from trdlab.explain.comparison.visits import Visits, visit
+from trdlab.explain.playing import Progress
 from trdlab.tabular import ExactTable
 
 AXIS = TimeAxis(0.95, 4)
@@ -37,14 +38,21 @@ def kinds(comparison: Comparison) -> dict[str, Any]:
     return {finding.kind(): finding for finding in found}
 
 
-def told(first: np.ndarray, second: np.ndarray, axis: TimeAxis, different: int = 20) -> Comparison:
-    """Returns the comparison of one action's components `[M, N+1]`, each state of its own episode.
+def told(
+    first: np.ndarray,
+    second: np.ndarray,
+    axis: TimeAxis,
+    different: int = 20,
+    seed: np.ndarray | None = None,
+) -> Comparison:
+    """Returns the comparison of one action's components `[M, N+1]`.
 
     Args:
         first: what A expects.
         second: what B expects.
         axis: what the components mean.
         different: how many different episodes there are.
+        seed: `[M]`, of the episode of each state; by default each has its own.
     """
     count = len(first)
     visits = Visits(
@@ -52,7 +60,7 @@ def told(first: np.ndarray, second: np.ndarray, axis: TimeAxis, different: int =
         components=np.stack([first, second])[:, :, None],
         probabilities=np.ones((2, count, 1)),
         player=np.arange(count) % 2,
-        seed=np.arange(count),
+        seed=np.arange(count) if seed is None else seed,
         step=np.zeros(count, dtype=np.int64),
         different=different,
     )
@@ -135,6 +143,26 @@ def test_an_interval_that_could_be_turned_round_is_not_claimed():
     assert "expects-more" in kinds(alike)  # of these episodes, and no others
 
 
+def test_episodes_that_both_play_alike_tell_of_the_same_chance_once():
+    rng = np.random.default_rng(0)
+    first, second = rng.normal(size=(2, 30, 3))
+    once = told(first, second, TimeAxis(0.9, 2))
+    both = np.repeat(np.arange(30), 2)  # the states of A's episodes, and of B's, which are the same
+    twice = told(first[both], second[both], TimeAxis(0.9, 2), seed=both)
+    np.testing.assert_allclose(twice.difference.low, once.difference.low)
+    np.testing.assert_allclose(twice.difference.high, once.difference.high)
+
+
+def test_episodes_that_do_not_end_are_cut_off_and_it_says_so():
+    agent = gridworld_agent("drone", AXIS)
+    stuck = replace(agent, policy=lambda states: np.tile([1.0, 0.0, 0.0, 0.0], (len(states), 1)))
+    comparison = compare(stuck, agent, episodes=6, judged_by=0, max_steps=30)
+    found = kinds(comparison)
+    assert (found["some-cut-off"].episodes, found["some-cut-off"].steps) == (6, 30)
+    assert comparison.visits.step.max() < 30
+    assert "some-cut-off" not in kinds(compare(agent, agent, episodes=6, judged_by=0))
+
+
 def test_the_centre_of_rewards_by_hand():
     axis = TimeAxis(0.9, 2, 3)
     means = np.array([[1.0, 2.0, 1.0], [-1.0, 0.0, -1.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]])
@@ -190,15 +218,19 @@ def test_it_is_told_whose_forecasts_can_be_trusted():
         components[..., 2:] += noise.normal(size=components[..., 2:].shape)
         return components
 
-    heard: list[int] = []
+    heard: list[Progress] = []
     comparison = compare(
-        agent, changed(agent, worse), episodes=5, judged_by=200, on_episode=heard.append
+        agent, changed(agent, worse), episodes=5, judged_by=200, watch=heard.append
     )
     found = kinds(comparison)
     assert (found["trusted-all-along"].side, found["trusted-all-along"].step) == ("A", 3)
     assert (found["trusted-up-to"].side, found["trusted-up-to"].step) == ("B", 1)
-    assert heard == sorted(heard)
-    assert heard[-1] == 2 * 5 + 2 * 200
+    assert list(dict.fromkeys(progress.what for progress in heard)) == [
+        "episodes to compare at",
+        "episodes to judge by A",
+        "episodes to judge by B",
+    ]
+    assert (heard[-1].finished, heard[-1].episodes) == (200, 200)
 
 
 def test_different_futures_are_each_told():

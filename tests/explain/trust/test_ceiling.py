@@ -14,8 +14,9 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explain.branches import Branching
 from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
-from trdlab.explain.counterfactual import counterfactual, play_to
+from trdlab.explain.counterfactual import counterfactual
 from trdlab.explain.episodes import collect
+from trdlab.explain.playing import play_to
 from trdlab.explain.trust.calibration import calibrate
 from trdlab.explain.trust.ceiling import ceiling, exact_ceiling
 from trdlab.explain.trust.intervals import Estimates

@@ -96,6 +96,18 @@ class ComparedAt(ComparisonFinding):
 
 
 @dataclass(eq=False, repr=False)
+class SomeCutOff(ComparisonFinding):
+    """Some episodes would have gone on, but were not played for longer."""
+
+    episodes: int
+    steps: int
+
+    def holds(self, comparison: Comparison) -> bool:
+        right = (self.episodes, self.steps) == (comparison.visits.cut, comparison.max_steps)
+        return right and self.episodes > 0
+
+
+@dataclass(eq=False, repr=False)
 class AllAlike(ComparisonFinding):
     """So few of the episodes differ that nothing can be told of others."""
 

@@ -151,4 +151,5 @@ def _background(comparison: Comparison) -> Findings:
             background.OneTells(side, future.policy, future.reward, future.ending)
             for side, future in zip(SIDES, comparison.futures, strict=True)
         )
-    return (*futures, at, *((alike,) if alike.holds(comparison) else ()))
+    cut = background.SomeCutOff(comparison.visits.cut, comparison.max_steps or 0)
+    return (*futures, at, *(claim for claim in (cut, alike) if claim.holds(comparison)))

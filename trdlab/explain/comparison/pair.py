@@ -1,17 +1,17 @@
 """Two agents brought together: found, checked that they can be compared, and compared."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from trdlab.errors import InputError
 from trdlab.explain.agents import AXIS, Agent, find_agent
 from trdlab.explain.assessment import assess
-from trdlab.explain.comparison.report import Comparison, compared
+from trdlab.explain.comparison.report import SIDES, Comparison, compared
 from trdlab.explain.comparison.visits import visit
 from trdlab.explain.models import is_model
 from trdlab.explain.places import seen
+from trdlab.explain.playing import Progress, Watch, unwatched, usual_limit
 from trdlab.explain.trust.report import TrustReport
 
 _EPISODES, _EPISODES_OF_TABLES = 50, 300
@@ -60,8 +60,9 @@ def compare(
     episodes: int | None = None,
     judged_by: int | None = None,
     seed: int = 0,
+    max_steps: int | None = None,
     most_states: int = _MOST_STATES,
-    on_episode: Callable[[int], None] = lambda finished: None,
+    watch: Watch = unwatched,
 ) -> Comparison:
     """Compares two agents at states of episodes of both, played where the first one acts.
 
@@ -72,8 +73,10 @@ def compare(
         judged_by: how many more each plays to judge its forecasts by, 0 for none; by default as
             many, or where nothing is said 300 of an exact table.
         seed: of the first episode, and of everything else.
+        max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
+            says.
         most_states: how many states are kept at most, half of them of the episodes of each.
-        on_episode: called with the number of finished episodes.
+        watch: told how far the episodes are, after every step.
 
     Raises:
         InputError: the two do not see or do the same, discount otherwise, or there is no episode.
@@ -84,17 +87,21 @@ def compare(
     check_comparable(first, second)
     away = () if second.place == first.place else first.place
     there = replace(second, make=first.make, place=first.place, words=(*second.words, *away))
-    players, done = (first, there), 2 * count
+    players = (first, there)
+    longest = max(usual_limit(agent.estimator.time_axis) for agent in players)
+    limit = longest if max_steps is None else max_steps
     visits = visit(
-        players, episodes=count, seed=seed, most_states=most_states, on_episode=on_episode
+        players, episodes=count, seed=seed, most_states=most_states, max_steps=limit, watch=watch
     )
     reports: list[TrustReport | None] = []
-    for agent in players:
+    for side, agent in zip(SIDES, players, strict=True):
+
+        def tell(progress: Progress, side: str = side) -> None:
+            watch(replace(progress, what=f"{progress.what} {side}"))
+
         usual = _EPISODES if agent.world is None else _EPISODES_OF_TABLES
         more = judged_by if judged_by is not None else episodes or usual
-        going_on = partial(_count_on, on_episode, done)
-        reports.append(assess(agent, episodes=more, on_episode=going_on) if more else None)
-        done += more
+        reports.append(assess(agent, episodes=more, max_steps=limit, watch=tell) if more else None)
     return compared(
         visits,
         names=(first.name, second.name),
@@ -104,13 +111,10 @@ def compare(
         futures=(first.estimator.future, second.estimator.future),
         reports=(reports[0], reports[1]),
         episodes=count,
+        max_steps=limit,
         seconds_per_step=first.seconds_per_step,
         seed=seed,
     )
-
-
-def _count_on(on_episode: Callable[[int], None], before: int, finished: int) -> None:
-    on_episode(before + finished)
 
 
 def check_comparable(first: Agent, second: Agent) -> None:

@@ -29,7 +29,8 @@ SIDES = ("A", "B")
 class Comparison:
     """How far two agents are apart, on average over the states that both came to.
 
-    Intervals are bootstrapped by episode; they are NaN where too few episodes differ.
+    Intervals are bootstrapped by the seeds of the episodes: the two episodes of a seed, that of the
+    one agent and that of the other, can be much alike. They are NaN where too few episodes differ.
 
     Args:
         names: of the two.
@@ -47,6 +48,7 @@ class Comparison:
         shift: by how many steps later the second expects its rewards (see `centre`).
         agreement: the share of the states at which both would take the same action.
         reports: how far the forecasts of each can be trusted; None where that was not judged.
+        max_steps: after which an episode was cut off, if not before; None for never.
         seconds_per_step: how long a step takes as people play, if that is known.
     """
 
@@ -65,6 +67,7 @@ class Comparison:
     shift: Estimate
     agreement: Estimate
     reports: tuple[TrustReport | None, TrustReport | None] = (None, None)
+    max_steps: int | None = None
     seconds_per_step: float | None = None
 
     @property
@@ -92,8 +95,10 @@ def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
         ],
         axis=1,
     )  # [M, 5·(N+1) + 1]
-    episode = np.eye(visits.episode.max() + 1)[visits.episode]  # [M, E]
     counted = np.concatenate([np.ones((len(visits), 1)), rows], axis=1)
+    seeds, of = np.unique(visits.seed, return_inverse=True)  # [E], [M]
+    sums = np.zeros((len(seeds), counted.shape[1]))  # [E, 5·(N+1) + 2]
+    np.add.at(sums, of.ravel(), counted)
 
     def statistics(sums: FloatArray) -> FloatArray:
         means = sums[:, 1:] / sums[:, :1]
@@ -102,7 +107,6 @@ def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
         one, other = (centre(means[:, i * size : (i + 1) * size], visits.time_axis) for i in (0, 1))
         return np.column_stack([means, gap, other - one])
 
-    sums = episode.T @ counted  # [E, 5·(N+1) + 2]
     drawn = draws(len(sums), RESAMPLES, np.random.default_rng(seed))
     values = statistics(pooled(drawn, sums))
     found = percentiles(values, LEVEL, visits.different >= FEWEST_EPISODES)

@@ -1,18 +1,18 @@
 """The states that two agents came to, and what each of them expects there."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import blake2b
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trdlab.arrays import FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
-from trdlab.environments.stack import FrameStack
 from trdlab.explain.agents import Agent
-from trdlab.explain.episodes import Decision, decide
+from trdlab.explain.playing import Decision, Playing, Progress, Watch, decide, unwatched
 
 _ROUNDING = 1e-9  # of the largest component; what differs by less is the same
 _BATCH = 256
@@ -31,6 +31,7 @@ class Visits:
         seed: `[M]`, of that episode.
         step: `[M]`, how many steps had been taken in it.
         different: how many different episodes the states are from.
+        cut: how many episodes were not played to their end.
     """
 
     time_axis: TimeAxis
@@ -40,6 +41,7 @@ class Visits:
     seed: IntArray
     step: IntArray
     different: int
+    cut: int = 0
 
     def __len__(self) -> int:
         return len(self.player)
@@ -68,11 +70,6 @@ class Visits:
     def apart(self) -> FloatArray:
         """`[M]`: how far apart the two are, over all components of what each would do."""
         return np.asarray(np.abs(self.difference).sum(axis=-1))
-
-    @cached_property
-    def episode(self) -> IntArray:
-        """`[M]`: the number of the episode of each state."""
-        return np.unique(np.stack([self.player, self.seed]), axis=1, return_inverse=True)[1].ravel()
 
     def furthest(self, count: int) -> list[int]:
         """Returns the states at which the two are furthest apart, no two of them much alike.
@@ -105,7 +102,8 @@ def visit(
     episodes: int,
     seed: int = 0,
     most_states: int,
-    on_episode: Callable[[int], None] = lambda finished: None,
+    max_steps: int | None = None,
+    watch: Watch = unwatched,
 ) -> Visits:
     """Plays episodes of two agents, and asks both what they expect at the states of them all.
 
@@ -117,18 +115,24 @@ def visit(
         episodes: how many each plays, with the seeds from `seed` on.
         seed: of the first episode, and of the choice of states.
         most_states: how many states are kept at most, evenly spaced over all episodes.
-        on_episode: called with the number of finished episodes.
+        max_steps: after which an episode is cut off, if not before.
+        watch: told how far the episodes are, after every step.
     """
-    rng, done, different = np.random.default_rng(seed), 0, set()
+    rng, different, cut = np.random.default_rng(seed), set(), 0
     kept = _Kept(most_states // 2), _Kept(most_states // 2)
     for player, agent in enumerate(players):
         for own in range(seed, seed + episodes):
-            different.add(_play(agent, own, kept[player], player, int(rng.integers(_PHASES))))
-            done += 1
-            on_episode(done)
+            done, phase = player * episodes + own - seed, int(rng.integers(_PHASES))
+            told = blake2b()
+            for step, observation, happened, is_cut in _played(agent, own, max_steps):
+                kept[player].offer(phase + step, _Seen(player, own, step, observation))
+                told.update(observation.tobytes() + happened)
+                cut += is_cut
+                watch(Progress("episodes to compare at", done, 2 * episodes, step))
+            different.add(told.digest())
     count = min(len(of.found) for of in kept)
     found = [item for of in kept for item in of.evenly(count)]
-    return _visits(players, found, len(different))
+    return replace(_visits(players, found, len(different)), cut=cut)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,29 +165,33 @@ class _Kept:
         return [self.found[i][1] for i in which]
 
 
-def _play(agent: Agent, seed: int, kept: _Kept, player: int, phase: int) -> bytes:
+def _played(
+    agent: Agent, seed: int, max_steps: int | None
+) -> Iterator[tuple[int, NDArray[Any], bytes, bool]]:
     """Plays one episode just as `Agent.moment` does, so that it can show each of its steps.
 
-    Returns:
-        What tells the episode from others.
+    Args:
+        agent: who plays.
+        seed: of the episode.
+        max_steps: after which it is cut off.
+
+    Yields:
+        The number of each step, what was seen there, what was done and paid, and whether more could
+        have come of an episode that is not played on.
     """
     environments, rng = agent.make(1, seed), np.random.default_rng(seed)
-    told, taken, is_running = blake2b(), 0, True
     try:
-        stack = FrameStack(environments.reset(), environments.stack, environments.padding)
-        while is_running:
-            observation = np.array(stack.observations[0])
-            kept.offer(phase + taken, _Seen(player, seed, taken, observation))
-            decision = decide(agent.estimator, stack.observations, agent.policy)
-            actions = decision.draw(rng)
-            step = environments.step(actions)
-            for part in (observation, actions, step.rewards):
-                told.update(part.tobytes())
-            stack.push(step.following, step.ended)
-            taken, is_running = taken + 1, not step.ended[0]
+        playing = Playing(
+            agent.estimator, environments, rng, policy=agent.policy, max_steps=max_steps
+        )
+        while playing.running[0]:
+            at, observation = playing.steps, np.array(playing.stack.observations[0])
+            _, actions = playing.decide()
+            step = playing.take(actions)
+            is_cut = bool(playing.finished[0] and not step.ended[0])
+            yield at, observation, actions.tobytes() + step.rewards.tobytes(), is_cut
     finally:
         environments.close()
-    return told.digest()
 
 
 def _visits(players: tuple[Agent, Agent], found: Sequence[_Seen], different: int) -> Visits:

@@ -17,6 +17,7 @@ from trdlab.explain.promises import (
     Foreseen,
     ForeseenFully,
     LatePromise,
+    OverduePromise,
     broken_promises,
     foreseen,
 )
@@ -193,8 +194,8 @@ def test_an_agent_that_circles_promises_what_never_comes(component):
     (circling,) = collect(estimator, ModelEnvironments(world.mdp, 1, seed=0, time_limit=20))
     told = Played(circling, world.action_names)
     assert circling.rewards.sum() == 0.0
-    assert broken_promises(told) == (BrokenPromise(0, 19, component),)
-    assert tell(told).most == BrokenPromise(0, 19, component)
+    assert broken_promises(told) == (OverduePromise(0, 19, component),)  # it was cut off
+    assert tell(told).most == OverduePromise(0, 19, component)
     assert len(tell(told).moments) == 1  # and not each step of it
 
 
@@ -211,9 +212,10 @@ def test_a_promise_that_is_kept_later_is_late_and_one_that_is_kept_in_time_is_no
 
 def test_a_claim_about_a_part_of_the_stay_does_not_hold():
     told = played([[0.0, 0.5, 0.0]] * 11, [0.0] * 10, TimeAxis(0.5, 2), terminated=False)
-    assert BrokenPromise(0, 9, 1).holds(told)
+    assert OverduePromise(0, 9, 1).holds(told)
+    assert not BrokenPromise(0, 9, 1).holds(told)  # what was cut off can still have come
     for first, last, component in ((1, 9, 1), (0, 8, 1), (0, 9, 0), (0, 10, 1), (-1, 9, 1)):
-        assert not BrokenPromise(first, last, component).holds(told)
+        assert not OverduePromise(first, last, component).holds(told)
 
 
 def test_for_wider_groups_a_promise_may_stay_as_long_as_they_are():

@@ -19,7 +19,13 @@ from trdlab.show.trials import TEMPLATES, check_trial, trial_sentences
 from trdlab.tabular import ExactTable
 
 AXIS = TimeAxis(0.95, 4)
-WORDS = {"did not pay": "paid", "paid": "did not pay", "open": "closed", "always": "never"}
+WORDS = {
+    "did not pay": "paid",
+    "paid": "did not pay",
+    "open": "closed",
+    "same": "best",
+    "in all": "up to t+1",
+}
 
 
 def changed(agent: Agent, action: int, component: int, by: float) -> Agent:
@@ -98,11 +104,30 @@ def test_without_chance_it_says_so_and_gives_no_interval():
     trial = try_out(gridworld_agent("drone", AXIS), "down", "up", copies=3)
     assert trial is not None
     assert trial_sentences(trial) == [
-        "Down and up were each tried 3 times from copies of this state, and each always went the "
-        "same way.",
+        "Down and up were each tried 3 times from copies of this state, and what each brought in "
+        "all was the same every time.",
         "As forecast, down paid more than up in all: by 0.27, where 0.27 was forecast.",
         "At t+1 down paid more than up, as forecast: by 0.95, where 0.95 was forecast.",
     ]
+
+
+def test_what_differs_by_rounding_was_not_forecast_to_differ():
+    agent = changed(gridworld_agent("drone", AXIS), action=2, component=2, by=1e-16)
+    left, right = (agent.moment().components(name) for name in ("left", "right"))
+    assert 0.0 < left[2] - right[2] < 1e-15
+    trial = try_out(agent, "left", "right", copies=3)
+    assert trial is not None
+    assert not trial.found.predicted.any()
+    assert [claim.kind() for claim in trial_findings(trial)] == ["always-the-same"]
+
+
+def test_without_explicit_components_it_is_not_seen_what_came_of_copies_that_go_on():
+    agent = gridworld_agent("drone", TimeAxis(0.95, 0))
+    stuck = replace(agent, policy=lambda states: np.tile([1.0, 0.0, 0.0, 0.0], (len(states), 1)))
+    trial = try_out(stuck, "left", "up", copies=3)
+    assert trial is not None
+    assert not trial.found.whole
+    assert [claim.kind() for claim in trial_findings(trial)] == ["not-seen"]
 
 
 def test_a_false_promise_is_found_out():

@@ -10,6 +10,7 @@ from trdlab.environments import CopyableEnvironments
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.explain.branches import Branches, Branching
+from trdlab.explain.moment import RELATIVE_ZERO
 from trdlab.explain.trust.intervals import LEVEL, RESAMPLES, Estimates, draws, percentiles
 
 
@@ -87,16 +88,23 @@ def counterfactual(
     varies = np.max([np.ptp(of, axis=0) > 0.0 for of in futures], axis=0)  # [N+2]
     found = percentiles(one - other, level, branching.copies > 1)
     ends = (np.where(varies, end, found.value) for end in (found.low, found.high))
-    predicted = tried[0].predicted[0] - tried[1].predicted[0]
+    said = [branches.predicted[0] for branches in tried]  # 2 of [N+1]
+    whole_of = [row.sum() if whole else row[:-1].sum() for row in said]
     return Counterfactual(
         time_axis=branching.estimator.time_axis,
         action=action,
         foil=foil,
         copies=branching.copies,
         whole=whole,
-        predicted=np.append(predicted, (predicted if whole else predicted[:-1]).sum()),
+        predicted=_apart(*(np.append(*of) for of in zip(said, whole_of, strict=True))),
         observed=Estimates(found.value, *ends).where(np.True_, varies | ~varies.any()),
     )
+
+
+def _apart(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Returns one − other, 0 where they differ only by rounding."""
+    difference, least = one - other, RELATIVE_ZERO * np.maximum(np.abs(one), np.abs(other))
+    return np.where(np.abs(difference) <= least, 0.0, difference)
 
 
 def _futures(branches: Branches, whole: bool) -> FloatArray:

@@ -167,10 +167,20 @@ class _Broken(StoryClaim):
 
 @dataclass(eq=False, repr=False)
 class BrokenPromise(_Broken):
-    """It never came."""
+    """It never came, and the episode ended."""
 
     def holds(self, played: Played) -> bool:
-        return self._is_overdue(played) and self._kept_at(played) is None
+        never = self._is_overdue(played) and self._kept_at(played) is None
+        return never and played.episode.terminated
+
+
+@dataclass(eq=False, repr=False)
+class OverduePromise(_Broken):
+    """It had not come when the episode was cut off."""
+
+    def holds(self, played: Played) -> bool:
+        not_yet = self._is_overdue(played) and self._kept_at(played) is None
+        return not_yet and not played.episode.terminated
 
 
 @dataclass(eq=False, repr=False)
@@ -182,6 +192,9 @@ class LatePromise(_Broken):
     def holds(self, played: Played) -> bool:
         overdue = self._is_overdue(played) and self.came > self.last
         return overdue and self._kept_at(played) == self.came
+
+
+Broken = BrokenPromise | OverduePromise | LatePromise
 
 
 def promised(episode: Episode) -> IntArray:
@@ -203,12 +216,12 @@ def promised(episode: Episode) -> IntArray:
     return np.where((largest > 0.0) & (largest >= least[best]), best, -1)
 
 
-def broken_promises(played: Played) -> tuple[BrokenPromise | LatePromise, ...]:
+def broken_promises(played: Played) -> tuple[Broken, ...]:
     """Returns the promises that were not kept in time, the longest first."""
     found = sorted(_stays(played.episode), key=lambda stay: stay[0] - stay[1])
-    claims: list[BrokenPromise | LatePromise] = []
+    claims: list[Broken] = []
     for stay in found:
-        broken = BrokenPromise(*stay)
+        broken = (BrokenPromise if played.episode.terminated else OverduePromise)(*stay)
         kept = broken._kept_at(played)
         claims.append(broken if kept is None else LatePromise(*stay, kept))
     return tuple(claim for claim in claims if claim.holds(played))

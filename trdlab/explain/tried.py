@@ -72,7 +72,8 @@ def trial_findings(trial: Trial) -> tuple[TrialClaim, ...]:
     found, who = trial.found, (trial.action, trial.foil, trial.found.copies)
     if np.isnan(found.observed.value[-1]):
         return (NotSeen(*who),)
-    opening = (AlwaysTheSame if found.same_every_time else TriedOften)(*who)
+    same = found.same_every_time
+    opening = AlwaysTheSame(*who, trial.scope) if same else TriedOften(*who)
     told = (_told(trial, entry) for entry in (-1, *_furthest(trial)))
     return (opening, *(claim for claim in told if claim is not None))
 
@@ -109,10 +110,13 @@ class TriedOften(TrialClaim):
 
 @dataclass(eq=False, repr=False)
 class AlwaysTheSame(TriedOften):
-    """The same where all copies of an action went the same way."""
+    """The same where all copies of an action brought the same, as far as was seen."""
+
+    scope: str
 
     def holds(self, trial: Trial) -> bool:
-        return self._fits(trial) and trial.found.same_every_time
+        is_same = trial.found.same_every_time and self.scope == trial.scope
+        return is_same and self._fits(trial)
 
 
 @dataclass(eq=False, repr=False)

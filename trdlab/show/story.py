@@ -61,6 +61,7 @@ TEMPLATES: dict[type[Claim], str] = {
         "early as it could be."
     ),
     promises.BrokenPromise: f"{_STAYED}never came.",
+    promises.OverduePromise: f"{_STAYED}had not come when the episode was cut off.",
     promises.LatePromise: f"{_STAYED}came only at step {{came:count}}.",
     story.NothingChanged: "No step changed what it expected.",
     story.LittleChanged: "No step changed what it expected by more than {most:bound}.",

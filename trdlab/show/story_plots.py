@@ -12,7 +12,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 
 from trdlab.arrays import FloatArray
-from trdlab.explain.promises import BrokenPromise, LatePromise
+from trdlab.explain.promises import Broken
 from trdlab.explain.story import Story
 from trdlab.explain.trust.trusted import Trust
 from trdlab.show.story import story_sentence
@@ -139,7 +139,7 @@ def _mark_moments(ax: Axes, below: Axes, told: Story) -> None:
         for panel in (ax, below):
             panel.axvline(place, color=_MARK, linewidth=0.7, linestyle=(0, (2, 2)), zorder=3)
     for claim in told.moments:
-        if isinstance(claim, BrokenPromise | LatePromise):
+        if isinstance(claim, Broken):
             rows = [claim.component] * 2
             for colour, width in (("white", 3.5), (_MARK, 1.5)):
                 ax.plot([claim.first, claim.last], rows, color=colour, linewidth=width, zorder=4)

@@ -11,7 +11,7 @@ TEMPLATES: dict[type[Claim], str] = {
     ),
     tried.AlwaysTheSame: (
         "{action} and {foil} were each tried {copies:count} times from copies of this state, and "
-        "each always went the same way."
+        "what each brought {scope:text} was the same every time."
     ),
     tried.NotSeen: (
         "{action} and {foil} were each tried {copies:count} times from copies of this state, but "

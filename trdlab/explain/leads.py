@@ -14,7 +14,7 @@ from trdlab.explain.rhythm import NEGLIGIBLE, SHARE, least, stands_out, undiscou
 NOISE = 0.1
 """A lead of what was learned may be noise up to this share of the largest one."""
 
-_SOON = 4  # rewards are immediate within the first quarter of the components
+_SOON = 0.2  # of the explicit steps: what comes within them is immediate
 _MOST_CROSSINGS = 2  # of more only the last is told
 
 
@@ -218,8 +218,9 @@ def _least(moment: Moment, action: str, foil: str) -> float:
 def _called(moment: Moment, leader: str, other: str, count: int) -> type[_Lead]:
     """Returns in which words a lead is told that is furthest after so many components.
 
-    Rewards are called immediate if at least `SHARE` of the lead is there within the first quarter
-    of the components. Neither they nor costs are called so where some of the other kind stand out.
+    Rewards are called immediate if at least `SHARE` of the lead is there at the next step, or within
+    `_SOON` of the explicit ones. Neither they nor costs are called so where some of the other kind
+    stand out.
     """
     effects = np.concatenate([_notable(moment, name)[:count] for name in (leader, other)])
     ahead, behind = _sum(moment, leader, count), _sum(moment, other, count)
@@ -228,8 +229,8 @@ def _called(moment: Moment, leader: str, other: str, count: int) -> type[_Lead]:
     if ahead <= 0.0 or behind < 0.0 or (effects < 0.0).any():
         return PaysMoreNet
     lead = running_lead(moment, leader, other)[:count]
-    begins = int((lead >= SHARE * lead[-1]).argmax())
-    is_soon = begins <= moment.time_axis.num_components / _SOON
+    axis, begins = moment.time_axis, int((lead >= SHARE * lead[-1]).argmax())
+    is_soon = axis.start(begins) <= max(1.0, _SOON * axis.num_steps)
     return MoreImmediate if is_soon else PaysMore
 
 

@@ -218,9 +218,9 @@ def _least(moment: Moment, action: str, foil: str) -> float:
 def _called(moment: Moment, leader: str, other: str, count: int) -> type[_Lead]:
     """Returns in which words a lead is told that is furthest after so many components.
 
-    Rewards are called immediate if at least `SHARE` of the lead is there at the next step, or within
-    `_SOON` of the explicit ones. Neither they nor costs are called so where some of the other kind
-    stand out.
+    Rewards are called immediate if at least `SHARE` of the lead is there at the next step, or
+    within `_SOON` of the explicit ones. Neither they nor costs are called so where some of the
+    other kind stand out.
     """
     effects = np.concatenate([_notable(moment, name)[:count] for name in (leader, other)])
     ahead, behind = _sum(moment, leader, count), _sum(moment, other, count)

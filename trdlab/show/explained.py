@@ -49,7 +49,7 @@ _FAULTS = (
     "goes-on-in-next",
     "goes-on-after-end",
 )
-_OUTCOMES = ("came-in-all", "missed-in-all", "missed-at")
+_OUTCOMES = ("came-in-all", "missed-in-all", "open-in-all", "missed-at")
 _NOT_TRIED = "It was not: the states of this environment cannot be copied."
 _MOST_OF_EACH = 2  # sentences of a kind, where only what matters most is told
 
@@ -183,8 +183,10 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
     add(_setting(explained), "dim")
     add("")
     if not explained.parts:
-        for text in summary(explained):
-            add(text)
+        for section in summary(explained):
+            add(section.heading, "bold")
+            for text in section.sentences:
+                add(text, indent=2)
         return Group(*lines)
     explanation = explained.explanation
     if explanation is not None:
@@ -214,29 +216,49 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
     return Group(*lines)
 
 
-def summary(explained: Explained) -> list[str]:
-    """Returns the few sentences that matter most.
+@dataclass(frozen=True)
+class Section:
+    """A few sentences under the question that they answer.
 
-    Whose future it is, how far it can be trusted and why no further, what the action promises, why
-    not the next best, and the moment of the episode that surprised most, if one did.
+    Args:
+        heading: the question, in short.
+        sentences: the answer.
     """
-    texts: list[str] = []
-    explanation, report = explained.explanation, explained.report
+
+    heading: str
+    sentences: tuple[str, ...]
+
+
+def summary(explained: Explained) -> list[Section]:
+    """Returns the few sentences that matter most, by the question that they answer.
+
+    What the action promises, why not the next best and what came of both, the moment of the episode
+    that surprised most if one did, how far to trust that and why no further, whose future it is.
+    """
+    explanation, report, told = explained.explanation, explained.report, explained.story
+    sections: dict[str, list[str]] = {}
     if explanation is not None:
-        texts += _told(explanation.context[:1], explanation)
+        promises = _told(explanation.forecast[:_MOST_OF_EACH], explanation)
+        sections[f"What {explanation.action} promises"] = promises
+        sections[f"Why not {explanation.foil}"] = [
+            *_told(in_short(explanation.contrast), explanation),
+            *(() if explained.trial is None else _outcomes(explained.trial)),
+        ]
+    if told is not None and told.most is not None:
+        sections["What surprised it in this episode"] = [story_sentence(told.most, told.played)]
     if report is not None:
         found = trust_findings(report)
         shown = [x for i, x in enumerate(found) if i < _MOST_OF_EACH or x.kind() in _FAULTS]
-        texts += [trust_sentence(finding, report) for finding in shown]
+        sections["How far to trust it"] = [trust_sentence(finding, report) for finding in shown]
     if explanation is not None:
-        texts += _told(explanation.forecast[:_MOST_OF_EACH], explanation)
-        texts += _told(in_short(explanation.contrast), explanation)
-    if explained.trial is not None:
-        tried = [x for x in trial_findings(explained.trial) if x.kind() in _OUTCOMES]
-        texts += [trial_sentence(finding, explained.trial) for finding in tried]
-    if explained.story is not None and explained.story.most is not None:
-        texts.append(story_sentence(explained.story.most, explained.story.played))
-    return texts
+        sections["Whose future"] = _told(explanation.context[:1], explanation)
+    return [Section(heading, tuple(texts)) for heading, texts in sections.items() if texts]
+
+
+def _outcomes(trial: Trial) -> list[str]:
+    """Returns what matters most of two actions that were tried."""
+    found = [finding for finding in trial_findings(trial) if finding.kind() in _OUTCOMES]
+    return [trial_sentence(finding, trial) for finding in found]
 
 
 def check_explained(text: str, explained: Explained) -> list[Claim]:
@@ -289,7 +311,7 @@ def to_dict(explained: Explained) -> dict[str, Any]:
         "max_steps": explained.max_steps,
         "time_axis": {**asdict(axis), "labels": axis.labels},
         "future": asdict(explained.agent.estimator.future),
-        "summary": summary(explained),
+        "summary": [asdict(section) for section in summary(explained)],
         "moment": moment,
         "trial": None if explained.trial is None else _trial_to_dict(explained.trial),
         "episode": None

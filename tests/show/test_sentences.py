@@ -15,10 +15,11 @@ from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.finding import Finding
 from trdlab.explain.leads import LEADS, MakesUp, Overtakes
 from trdlab.explain.moment import Moment, Uncertainty, WhatIf
-from trdlab.explain.tabular import gridworld_moment
+from trdlab.explain.tabular import gridworld_moment, tabular_moment
 from trdlab.explain.trust.trusted import Trust
-from trdlab.gridworld import Gridworld, load_map, map_names
+from trdlab.gridworld import Gridworld, load_map, map_names, parse_map
 from trdlab.show.sentences import TEMPLATES, UnsupportedSentenceError, check, sentences
+from trdlab.study.candidates import solved
 from trdlab.tabular import exact
 
 NAMES = ("up", "down", "FIRE", "move left")
@@ -145,6 +146,11 @@ def of_maps() -> list[Explanation]:
             table = exact(world.mdp, axis)
             states = range(0, world.mdp.num_states, 4) if name != "corridor" else (0,)
             result += [explain(gridworld_moment(world, table, state)) for state in states]
+    pebble = Gridworld(parse_map("p = coin 0.001\nT = treasure 100 terminal\n---\nS.p.....T"))
+    result.append(explain(gridworld_moment(pebble, exact(pebble.mdp, TimeAxis(0.95, 4)), 0)))
+    world, table = solved("C")  # who may slip into what costs much
+    for state in range(0, world.mdp.num_states, 5):
+        result.append(explain(tabular_moment(table, state, world.action_names)))
     return result
 
 

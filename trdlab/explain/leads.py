@@ -107,22 +107,18 @@ class _Lead(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class MoreImmediate(_Lead):
     """The same where rewards come soon, and no cost comes with them."""
 
 
-@dataclass(eq=False, repr=False)
 class PaysMore(_Lead):
     """The same where rewards do not come soon."""
 
 
-@dataclass(eq=False, repr=False)
 class PaysMoreNet(_Lead):
     """The same where there are costs too."""
 
 
-@dataclass(eq=False, repr=False)
 class CostsLess(_Lead):
     """The same where there are nothing but costs; the sums are what it costs."""
 

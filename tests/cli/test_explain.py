@@ -2,6 +2,7 @@
 
 import json
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -201,3 +202,38 @@ def test_a_gridworld_is_explained_without_pytorch(tmp_path):
         "assert 'torch' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True)
+
+
+def test_episodes_are_cut_off_and_it_says_so(trdlab, trained):
+    words = (trained, "--episodes", 12, "--what", "episode")
+    _, out, _ = trdlab(*words, "--max-steps", 2)
+    assert "episodes are cut off after 2 steps" in out
+    assert "The episode was cut off after 2 steps" in out
+    _, out, _ = trdlab(*words, "--max-steps", 2, "--json")
+    data = json.loads(out)
+    assert (data["max_steps"], data["episode"]["steps"]) == (2, 2)
+    _, out, _ = trdlab("gridworld:ledge", "--episodes", 12, "--what", "episode")
+    assert "cut off after" not in out
+    code, _, err = trdlab(trained, "--max-steps", 2, "--step", 2)
+    assert code == 2
+    assert "There is no step 2 in 2 steps. Choose another --max-steps." in err
+
+
+def test_a_moment_as_json_tells_its_errors_and_its_only_reward(trdlab, trained):
+    _, out, _ = trdlab(trained, "--what", "forecast", "--json", "--episodes", 30)
+    data = json.loads(out)
+    assert data["seconds_per_step"] == 0.25
+    assert len(data["moment"]["error"]) == 5
+    assert data["moment"]["only_reward"] == 1.0  # the sign of each
+    _, out, _ = trdlab(trained, "--what", "forecast", "--json", "--episodes", 0)
+    assert json.loads(out)["moment"]["error"] is None
+
+
+def test_what_is_interrupted_leaves_nothing(tmp_path):
+    words = [sys.executable, "-m", "trdlab", "explain", "gridworld:ledge,slip=0.2"]
+    with subprocess.Popen([*words, "--episodes", "1000000"], cwd=tmp_path) as process:
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(timeout=2.0)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=60.0) == 130
+    assert list(tmp_path.iterdir()) == []

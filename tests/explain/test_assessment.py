@@ -19,8 +19,9 @@ from trdlab.explain import (
     explain,
     gridworld_agent,
 )
+from trdlab.explain.copies import ModelEnvironments
 from trdlab.show import check, sentences
-from trdlab.tabular import ExactTable
+from trdlab.tabular import MDP, ExactTable, exact
 
 AXIS = TimeAxis(0.95, 4)
 
@@ -123,6 +124,21 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
     agent = Agent("once", drone.estimator, ("wait", "take"), make)
     report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
     assert (report.ceiling is not None) == copyable
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_moments_are_found_in_short_episodes_beside_a_few_that_never_end(seed):
+    over, stuck = (0.95, 0, 1.0, True), (0.05, 1, 0.0, False)
+    mdp = MDP.from_transitions([[[over, stuck]], [[(1.0, 1, 0.0, False)]]])
+
+    def make(num_envs: int, seed: int) -> Environments:
+        return ModelEnvironments(mdp, num_envs, seed=seed)
+
+    agent = Agent("short", exact(mdp, AXIS), ("wait",), make)
+    report = assess(agent, episodes=60, max_steps=400, copying=Copying(episodes=2), seed=seed)
+    assert report.ceiling is not None
+    assert report.ceiling.num_moments >= 2
+    assert report.endings.truncated > 0
 
 
 def test_a_step_is_of_the_episode_that_the_story_tells():

@@ -39,7 +39,7 @@ AXIS = TimeAxis(0.95, 4)
 """Of an exact table, where nothing is said."""
 
 _OF_TABLES, _OF_OTHERS = Copying(episodes=100), Copying()
-_OF_GAMES = Copying(episodes=8, moments=3, copies=2, tries=10)  # a copy plays all of a game again
+_OF_GAMES = Copying(episodes=12, moments=2, copies=2, tries=10)  # a copy plays all of a game again
 _DIGITS = 19  # more are no number of steps
 
 

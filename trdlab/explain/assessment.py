@@ -8,7 +8,7 @@ import numpy as np
 from trdlab.environments import CopyableEnvironments, Environments, NotCopyable
 from trdlab.errors import InputError
 from trdlab.explain.agents import Agent
-from trdlab.explain.branches import Branches, Branching, Copying
+from trdlab.explain.branches import Branches, Branching, Copying, TooFewMoments
 from trdlab.explain.counterfactual import counterfactual
 from trdlab.explain.episodes import Episode
 from trdlab.explain.playing import Watch, play_to, unwatched
@@ -65,8 +65,8 @@ def assess(
     copied = None
     if copying is not None:
         every = max(1, round(length / copying.moments))
-        how: dict[str, Any] = {"every": every, "epsilon": chance, "max_steps": max_steps}
-        copied = _copied(agent, copying, seed + 1, **how, watch=watch)
+        how: dict[str, Any] = {"epsilon": chance, "max_steps": max_steps, "watch": watch}
+        copied = _copied(agent, copying, every, seed + 1, **how)
     return judge(
         agent.estimator.future,
         played,
@@ -133,29 +133,34 @@ def _different(episodes: Sequence[Episode]) -> int:
 
 
 def _copied(
-    agent: Agent, copying: Copying, seed: int, **how: Any
+    agent: Agent, copying: Copying, every: int, seed: int, **how: Any
 ) -> tuple[Branches, Branches | None] | None:
     """Returns what else could have followed, and what follows foils, if there is another action.
 
+    Where a few long episodes hide that most are short, moments are copied more often than `every`.
     None where states cannot be copied.
     """
     branching = Branching(agent.estimator, agent.policy, agent.counting, copies=copying.copies)
 
-    def along(seed: int, *, foils: bool) -> Branches | None:
+    def along(every: int, seed: int, *, foils: bool) -> Branches | None:
         environments = agent.make(copying.episodes, seed)
         try:
             if not _can_be_copied(environments):
                 return None
-            return branching.along(environments, seed=seed, foils=foils, **how)
+            return branching.along(environments, every=every, seed=seed, foils=foils, **how)
         except NotCopyable:
             return None
+        except TooFewMoments:
+            if every == 1:
+                raise
+            return along(every // 2, seed, foils=foils)
         finally:
             environments.close()
 
-    branches = along(seed, foils=False)
+    branches = along(every, seed, foils=False)
     if branches is None:
         return None
-    return branches, along(seed + 1, foils=True) if len(agent.action_names) > 1 else None
+    return branches, along(every, seed + 1, foils=True) if len(agent.action_names) > 1 else None
 
 
 def _can_be_copied(environments: Environments) -> TypeGuard[CopyableEnvironments]:

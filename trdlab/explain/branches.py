@@ -16,6 +16,10 @@ from trdlab.explain.playing import Playing, Policy, Progress, Watch, decide, unw
 from trdlab.explain.trust.followed import Samples
 
 
+class TooFewMoments(InputError):  # noqa: N818  it says what episodes are, not what failed
+    """Episodes that are over before there is a moment to copy, or a second one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Branches:
     """M moments of E episodes, and what followed each of them n times, from copies of its state.
@@ -132,6 +136,9 @@ class Branching:
             seed: of the actions, the moments and the copies.
             foils: whether each copy begins with an action other than the policy's, drawn evenly.
             watch: told how far the episodes are, after every step.
+
+        Raises:
+            TooFewMoments: there are fewer than two.
         """
         rng, count = np.random.default_rng(seed), environments.num_envs
         phase, found = rng.integers(every, size=count), []
@@ -151,6 +158,12 @@ class Branching:
                 found.append(self._continued(environments, stack, moments, first, age, here, rng))
             playing.take(actions)
             watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
+        copied = sum(len(part.actions) for part in found)
+        if copied < 2:
+            raise TooFewMoments(
+                f"The episodes are so short that there are moments in them: {copied}.",
+                "Copy moments more often, or play more episodes.",
+            )
         return self._joined(found, count)
 
     def at(
@@ -244,10 +257,6 @@ class Branching:
 
     def _joined(self, found: list[Branches], num_episodes: int) -> Branches:
         """Returns the moments of all times, in the order of their episodes."""
-        if not found:
-            raise InputError(
-                "No episode was long enough to have a moment in it.", "Copy moments more often."
-            )
         order = np.argsort(np.concatenate([part.episode for part in found]), kind="stable")
         names = ("actions", "predicted", "observed", "known", "episode")
         arrays: dict[str, Any] = {

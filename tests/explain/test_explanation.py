@@ -9,7 +9,7 @@ import pytest
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import chances, contrast, flips, forecast, leads, rhythm, worth
+from trdlab.explain import chances, contrast, explain_agent, flips, forecast, leads, rhythm, worth
 from trdlab.explain.agents import gridworld_agent
 from trdlab.explain.contrast import in_short
 from trdlab.explain.copies import ModelEnvironments
@@ -28,7 +28,7 @@ from trdlab.explain.tabular import gridworld_moment
 from trdlab.explain.trust.report import judge
 from trdlab.explain.trust.trusted import Trust
 from trdlab.gridworld import Gridworld, load_map, parse_map
-from trdlab.show import check, explain_agent, sentences
+from trdlab.show import check, sentences
 from trdlab.tabular import exact, learn
 
 GAMMA = 0.95

@@ -10,9 +10,9 @@ import pytest
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import Moment, explain, gridworld_agent
-from trdlab.show import explain_agent, summary
-from trdlab.show.explained import Explained, Part, check_explained, parse_parts, to_dict
+from trdlab.explain import Moment, explain, explain_agent, gridworld_agent
+from trdlab.explain.explained import Explained, Part, parse_parts
+from trdlab.show.explained import check_explained, summary, to_dict
 from trdlab.show.explained_plots import moment_figure, part_figure, picture_paths
 from trdlab.show.sentences import UnsupportedSentenceError
 

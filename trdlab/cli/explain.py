@@ -90,9 +90,10 @@ def explain(
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.decomposition import TimeAxis
     from trdlab.explain.agents import find_agent
+    from trdlab.explain.explained import explain_agent, parse_parts
     from trdlab.show import explained as show
 
-    parts = show.parse_parts(what)
+    parts = parse_parts(what)
     own_axis = gamma is not None or horizon is not None or width is not None
     found = find_agent(
         agent,
@@ -116,7 +117,7 @@ def explain(
         paths = picture_paths(out, parts, seed=seed, step=step)
     errors = Console(stderr=True, highlight=False)
     with EpisodeProgress(errors) as progress:
-        explained = show.explain_agent(
+        explained = explain_agent(
             found,
             parts,
             seed=seed,

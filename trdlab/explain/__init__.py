@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
     from trdlab.explain.counterfactual import Counterfactual
     from trdlab.explain.episodes import Counting, Episode, collect
+    from trdlab.explain.explained import Explained, explain_agent
     from trdlab.explain.played import Played, play
     from trdlab.explain.playing import play_to
     from trdlab.explain.revision import Revision, revise
@@ -43,6 +44,7 @@ __all__ = [
     "Counterfactual",
     "Counting",
     "Episode",
+    "Explained",
     "Explanation",
     "Finding",
     "ModelEnvironments",
@@ -59,6 +61,7 @@ __all__ = [
     "collect",
     "compare",
     "explain",
+    "explain_agent",
     "find_agent",
     "find_flips",
     "find_pair",
@@ -99,6 +102,8 @@ _HOMES = {
     "Counting": "episodes",
     "Episode": "episodes",
     "collect": "episodes",
+    "Explained": "explained",
+    "explain_agent": "explained",
     "Played": "played",
     "play": "played",
     "Revision": "revision",

@@ -10,16 +10,15 @@ from trdlab.lazy import lazily
 from trdlab.show.sentences import UnsupportedSentenceError, check, sentence, sentences
 
 if TYPE_CHECKING:
-    from trdlab.show.explained import Explained, explain_agent, summary
+    from trdlab.show.explained import check_explained, summary
     from trdlab.show.trust_data import trust_to_dict
     from trdlab.show.verdicts import check_trust, trust_sentences
 
 __all__ = [
-    "Explained",
     "UnsupportedSentenceError",
     "check",
+    "check_explained",
     "check_trust",
-    "explain_agent",
     "sentence",
     "sentences",
     "summary",
@@ -28,8 +27,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Explained": "explained",
-    "explain_agent": "explained",
+    "check_explained": "explained",
     "summary": "explained",
     "trust_to_dict": "trust_data",
     "check_trust": "verdicts",

@@ -11,6 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import OutputError
+from trdlab.explain.explained import PARTS, Explained, Part
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.leads import difference
 from trdlab.explain.limits import doubtful
@@ -18,7 +19,6 @@ from trdlab.explain.moment import Moment
 from trdlab.explain.tried import Trial
 from trdlab.explain.trust.report import TrustReport
 from trdlab.files import check_output, write_whole
-from trdlab.show.explained import PARTS, Explained, Part
 from trdlab.show.plots import (
     plot_components,
     plot_contrast,

@@ -1,0 +1,138 @@
+"""An agent explained: what it expects at a moment, why nothing else, and how far to trust that."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from trdlab.errors import InputError, closest
+from trdlab.explain.agents import Agent
+from trdlab.explain.assessment import assess, try_out
+from trdlab.explain.explanation import Explanation, explain
+from trdlab.explain.limits import judged
+from trdlab.explain.played import play
+from trdlab.explain.playing import Watch, unwatched, usual_limit
+from trdlab.explain.story import Story, tell
+from trdlab.explain.tried import Trial
+from trdlab.explain.trust.report import TrustReport
+from trdlab.time_axis import TimeAxis
+
+Part = Literal["forecast", "contrast", "episode", "calibration"]
+PARTS: tuple[Part, ...] = get_args(Part)
+FIELDS: dict[Part, tuple[str, ...]] = {
+    "forecast": ("forecast", "limits", "context"),
+    "contrast": ("contrast", "flips", "limits", "context"),
+    "episode": (),
+    "calibration": (),
+}
+"""The fields of an `Explanation` that each part tells."""
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """An agent at one moment, and how far its forecasts can be trusted.
+
+    Args:
+        agent: whom it is about.
+        parts: what was asked for; nothing, if only what matters most is told.
+        seed: of the episode that the moment is in.
+        step: of that episode.
+        explanation: of the moment; None where no part that speaks of one was asked for.
+        report: how far forecasts can be trusted; None where no episodes were played.
+        trial: what came of action and foil where they were tried; None where they were not, or
+            where states cannot be copied.
+        story: of the whole episode; None where it was not asked for.
+        max_steps: after which episodes were cut off, if not before; None for never.
+    """
+
+    agent: Agent
+    parts: tuple[Part, ...]
+    seed: int
+    step: int
+    explanation: Explanation | None
+    report: TrustReport | None
+    trial: Trial | None = None
+    story: Story | None = None
+    max_steps: int | None = None
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """What the components mean."""
+        return self.agent.estimator.time_axis
+
+
+def parse_parts(text: str | None) -> tuple[Part, ...]:
+    """Returns the parts that are written with commas between them, in a fixed order.
+
+    Raises:
+        InputError: there is no such part.
+
+    >>> parse_parts("calibration,forecast")
+    ('forecast', 'calibration')
+    """
+    words = [] if text is None else [word.strip() for word in text.split(",")]
+    for word in words:
+        if word not in PARTS:
+            raise InputError(f"There is no explanation '{word}'.", closest(word, PARTS))
+    return tuple(part for part in PARTS if part in words)
+
+
+def explain_agent(
+    agent: Agent,
+    parts: tuple[Part, ...] = (),
+    *,
+    seed: int = 0,
+    step: int = 0,
+    action: str | None = None,
+    foil: str | None = None,
+    episodes: int | None = None,
+    max_steps: int | None = None,
+    watch: Watch = unwatched,
+) -> Explained:
+    """Explains an agent at a step of an episode of its own, and judges it by other episodes.
+
+    Args:
+        agent: whom to explain.
+        parts: what is asked for; without any, what matters most of all.
+        seed: of the episode that the moment is in.
+        step: of that episode.
+        action: the name or number of the action to explain, by default what the policy does.
+        foil: of the one to contrast it with, by default the best other one.
+        episodes: by how many the forecasts are judged, 0 for not at all; by default 300 of an exact
+            table and 50 of another agent.
+        max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
+            says, and no sooner than the step that is explained.
+        watch: told how far the episodes are, after every step.
+
+    Raises:
+        InputError: the episode has no such step, there is no such action, or no episode to judge
+            by where calibration was asked for.
+    """
+    wanted = parts or PARTS
+    if max_steps is not None and step >= max_steps:
+        raise InputError(
+            f"There is no step {step} in {max_steps} steps.", "Choose another --max-steps."
+        )
+    limit = max(usual_limit(agent.estimator.time_axis), step + 1)
+    limit = limit if max_steps is None else max_steps
+    is_of_moment = any(FIELDS[part] for part in wanted)
+    moment = agent.moment(seed=seed, step=step) if is_of_moment else None
+    chosen = None if action is None else agent.action(action)
+    other = None if foil is None else agent.action(foil)
+    pair = None if moment is None else moment.pair(chosen, other)  # fails before what takes long
+    if "contrast" in parts and pair is not None and pair[1] is None:
+        raise InputError("There is no other action to contrast it with.", "Ask for --what forecast")
+    count = (50 if agent.world is None else 300) if episodes is None else episodes
+    if "calibration" in parts and count == 0:
+        raise InputError("A calibration needs episodes.", "Ask for --episodes 50.")
+    told = tell(play(agent, seed, max_steps=limit)) if "episode" in wanted else None
+    copied = "calibration" in wanted or "contrast" in wanted
+    copying = agent.copying if copied else None
+    report = None
+    if count:
+        report = assess(agent, episodes=count, max_steps=limit, copying=copying, watch=watch)
+    explanation = None
+    if moment is not None and pair is not None:
+        explanation = explain(moment if report is None else judged(moment, report), *pair)
+    trial = None
+    if pair is not None and pair[1] is not None and "contrast" in wanted:
+        trial = try_out(agent, pair[0], pair[1], seed=seed, step=step)
+    return Explained(agent, parts, seed, step, explanation, report, trial, told, limit)

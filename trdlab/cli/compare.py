@@ -44,7 +44,7 @@ def compare(
             "--episodes",
             min=1,
             help="That each plays, and as many again to judge its forecasts by.",
-            show_default="50, to judge two exact tables 300",
+            show_default="20 and 50, of exact tables 50 and 300",
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first episode.")] = 0,
@@ -86,7 +86,7 @@ def compare(
 
         path = picture_path(out)
     errors = Console(stderr=True, highlight=False)
-    with EpisodeProgress(errors) as progress:
+    with EpisodeProgress(errors, "Getting ready") as progress:
         found = two.compare(
             *agents, episodes=episodes, max_steps=max_steps, seed=seed, watch=progress.on_progress
         )

@@ -116,7 +116,7 @@ def explain(
 
         paths = picture_paths(out, parts, seed=seed, step=step)
     errors = Console(stderr=True, highlight=False)
-    with EpisodeProgress(errors) as progress:
+    with EpisodeProgress(errors, "Getting ready") as progress:
         explained = explain_agent(
             found,
             parts,

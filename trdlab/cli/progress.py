@@ -112,10 +112,11 @@ class EpisodeProgress:
 
     Args:
         console: where to.
+        begin: what is shown before the first one is played.
     """
 
-    def __init__(self, console: Console) -> None:
-        self._status = console.status("Evaluating") if console.is_terminal else None
+    def __init__(self, console: Console, begin: str = "Evaluating") -> None:
+        self._status = console.status(begin) if console.is_terminal else None
 
     def __enter__(self) -> "EpisodeProgress":
         if self._status is not None:
@@ -135,6 +136,6 @@ class EpisodeProgress:
         """Shows how far episodes are that are played to explain an agent."""
         if self._status is not None:
             self._status.update(
-                f"Playing {progress.what}: {progress.finished} of {progress.episodes} are over, "
-                f"step {progress.steps:,}"
+                f"Playing {progress.what}: step {progress.steps:,}, {progress.finished} of "
+                f"{progress.episodes} are over"
             )

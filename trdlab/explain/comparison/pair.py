@@ -14,7 +14,8 @@ from trdlab.explain.places import seen
 from trdlab.explain.playing import Progress, Watch, unwatched, usual_limit
 from trdlab.explain.trust.report import TrustReport
 
-_EPISODES, _EPISODES_OF_TABLES = 50, 300
+_EPISODES, _JUDGED_BY = 20, 50  # of what has to be played; of an exact table it is cheap
+_EPISODES_OF_TABLES, _TABLES_JUDGED_BY = 50, 300
 _MOST_STATES = 1_000
 
 
@@ -69,9 +70,10 @@ def compare(
     Args:
         first: called A.
         second: called B; it acts where the first one does.
-        episodes: how many each plays, with the seeds from `seed` on; by default 50.
+        episodes: how many each plays, with the seeds from `seed` on; by default 20, or 50 if both
+            are exact tables.
         judged_by: how many more each plays to judge its forecasts by, 0 for none; by default as
-            many, or where nothing is said 300 of an exact table.
+            many, or where nothing is said 50, and 300 of an exact table.
         seed: of the first episode, and of everything else.
         max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
             says.
@@ -81,7 +83,9 @@ def compare(
     Raises:
         InputError: the two do not see or do the same, discount otherwise, or there is no episode.
     """
-    count = _EPISODES if episodes is None else episodes
+    tables = first.world is not None and second.world is not None
+    usual = _EPISODES_OF_TABLES if tables else _EPISODES
+    count = usual if episodes is None else episodes
     if count < 1:
         raise InputError(f"There are {count} episodes.", "Ask for at least 1.")
     check_comparable(first, second)
@@ -99,8 +103,8 @@ def compare(
         def tell(progress: Progress, side: str = side) -> None:
             watch(replace(progress, what=f"{progress.what} {side}"))
 
-        usual = _EPISODES if agent.world is None else _EPISODES_OF_TABLES
-        more = judged_by if judged_by is not None else episodes or usual
+        enough = _JUDGED_BY if agent.world is None else _TABLES_JUDGED_BY
+        more = judged_by if judged_by is not None else episodes or enough
         reports.append(assess(agent, episodes=more, max_steps=limit, watch=tell) if more else None)
     return compared(
         visits,

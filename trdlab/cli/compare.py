@@ -98,7 +98,8 @@ def compare(
         console, ascii_only = common.new_console()
         console.print(show.page(found, ascii_only=ascii_only))
     if out is not None:
-        from trdlab.show.comparison_plots import write_picture
+        from trdlab.show.comparison_plots import comparison_figure
+        from trdlab.show.pictures import write_picture
 
-        write_picture(found, path)
+        write_picture(comparison_figure(found), path)
         errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

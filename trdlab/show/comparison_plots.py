@@ -1,6 +1,5 @@
 """The picture of a comparison: what both expect, component by component, and the difference."""
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +9,10 @@ from matplotlib.patches import Patch
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.errors import OutputError
 from trdlab.explain.comparison.report import Comparison
 from trdlab.explain.trust.intervals import Estimates
-from trdlab.files import check_output, write_whole
 from trdlab.show.comparison import titles
+from trdlab.show.pictures import check_pictures
 from trdlab.time_axis import axis_title
 
 NAME = "comparison.png"
@@ -35,29 +33,8 @@ def picture_path(folder: Path) -> Path:
         OutputError: it exists, or cannot be written.
     """
     path = folder / NAME
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"'{folder}' is a file.", "Name a folder for the picture.")
-    if path.exists():
-        raise OutputError(f"The picture '{path}' exists.", "Choose another --out.")
-    if folder.is_dir():
-        check_output(path, (".png",))
+    check_pictures([path])
     return path
-
-
-def write_picture(comparison: Comparison, path: Path) -> None:
-    """Writes the picture of a comparison.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = error.strerror or error
-        raise OutputError(
-            f"Cannot make the folder '{path.parent}': {reason}.", "Choose another --out."
-        ) from error
-    write_whole(path, partial(comparison_figure(comparison).savefig, dpi=160))
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
@@ -71,7 +48,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     figure.supylabel("expected discounted reward, on average", fontsize=9, color=_MUTED)
     has_intervals = bool(np.isfinite(comparison.difference.low).any())
     count = f"{len(comparison.visits)} states of {2 * comparison.episodes} episodes"
-    whiskers = "whiskers: 95 % intervals by episode" if has_intervals else "too few for intervals"
+    whiskers = "whiskers: 95 % intervals" if has_intervals else "too few for intervals"
     figure.supxlabel(
         f"agent steps from now (t is the action taken now)\n{axis_title(comparison.time_axis)} · "
         f"{count} · {whiskers}",

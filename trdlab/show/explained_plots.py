@@ -1,7 +1,6 @@
 """Pictures of an explained agent: what it expects, what cannot be trusted of that, and why."""
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from trdlab.arrays import FloatArray
-from trdlab.errors import OutputError
 from trdlab.explain.explained import PARTS, Explained, Part
 from trdlab.explain.explanation import Explanation
 from trdlab.explain.leads import difference
@@ -18,7 +16,7 @@ from trdlab.explain.limits import doubtful
 from trdlab.explain.moment import Moment
 from trdlab.explain.tried import Trial
 from trdlab.explain.trust.report import TrustReport
-from trdlab.files import check_output, write_whole
+from trdlab.show.pictures import check_pictures, write_picture
 from trdlab.show.plots import (
     plot_components,
     plot_contrast,
@@ -56,12 +54,7 @@ def picture_paths(
     ending = {"episode": f"-seed-{seed}", "calibration": ""}
     moment = f"-seed-{seed}-step-{step}"
     paths = {part: folder / f"{part}{ending.get(part, moment)}.png" for part in parts or PARTS}
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"'{folder}' is a file.", "Name a folder for the pictures.")
-    for path in paths.values() if folder.is_dir() else ():
-        if path.exists():
-            raise OutputError(f"The picture '{path}' exists.", "Choose another --out.")
-        check_output(path, (".png",))
+    check_pictures(paths.values())
     return paths
 
 
@@ -80,14 +73,7 @@ def write_pictures(explained: Explained, paths: dict[Part, Path]) -> list[Path]:
         figure = part_figure(explained, part)
         if figure is None:
             continue
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(
-                f"Cannot make the folder '{path.parent}': {error.strerror or error}.",
-                "Choose another --out.",
-            ) from error
-        write_whole(path, partial(figure.savefig, dpi=160))
+        write_picture(figure, path)
         written.append(path)
     return written
 

@@ -214,6 +214,10 @@ def test_episodes_are_cut_off_and_it_says_so(trdlab, trained):
     assert (data["max_steps"], data["episode"]["steps"]) == (2, 2)
     _, out, _ = trdlab("gridworld:ledge", "--episodes", 12, "--what", "episode")
     assert "cut off after" not in out
+    judged = (trained, "--episodes", 12, "--what", "calibration")
+    assert (
+        "episodes are cut off after 1 step" in trdlab(*judged, "--max-steps", 1)[1].splitlines()[1]
+    )
     code, _, err = trdlab(trained, "--max-steps", 2, "--step", 2)
     assert code == 2
     assert "There is no step 2 in 2 steps. Choose another --max-steps." in err

@@ -234,18 +234,19 @@ def _setting(explained: Explained) -> str:
     if seconds is not None:
         words.append(f"a step is {seconds:.2g} s of play")
     if _is_cut_off(explained):
-        words.append(f"episodes are cut off after {explained.max_steps:,} steps")
+        unit = "step" if explained.max_steps == 1 else "steps"
+        words.append(f"episodes are cut off after {explained.max_steps:,} {unit}")
     return " · ".join(words)
 
 
 def _is_cut_off(explained: Explained) -> bool:
     """Returns whether an episode was cut off by us, and not by a limit of its environment."""
-    report, told, limit = explained.report, explained.story, explained.max_steps
-    cut = report is not None and report.endings.truncated > 0
-    if told is None:
-        return limit is not None and cut
-    episode = told.played.episode
-    return episode.time_limit == limit and (cut or not episode.terminated)
+    report, told, cut = explained.report, explained.story, set()
+    if report is not None and report.endings.truncated:
+        cut.add(report.endings.time_limit)
+    if told is not None and not told.played.episode.terminated:
+        cut.add(told.played.episode.time_limit)
+    return explained.max_steps in cut - {None}
 
 
 def _whose(explained: Explained) -> str:

@@ -76,21 +76,25 @@ class Endings:
         truncated: how many were cut off.
         life_losses: how often a life was lost and the episode went on.
         life_loss_ends: whether that counts as an end.
+        time_limit: the steps after which they were cut off, if that is known.
     """
 
     terminated: int
     truncated: int
     life_losses: int
     life_loss_ends: bool
+    time_limit: int | None = None
 
 
 def endings(episodes: Sequence[Episode]) -> Endings:
     """Returns how episodes ended."""
+    limits = {episode.time_limit for episode in episodes}
     return Endings(
         terminated=sum(episode.terminated for episode in episodes),
         truncated=sum(not episode.terminated for episode in episodes),
         life_losses=sum(int(episode.life_lost.sum()) for episode in episodes),
         life_loss_ends=any(bool((e.life_lost & e.ends).any()) for e in episodes),
+        time_limit=limits.pop() if len(limits) == 1 else None,
     )
 
 

@@ -59,7 +59,7 @@ def bootstrap(
     samples: Sequence[float] | FloatArray,
     statistic: Callable[[FloatArray], FloatArray] = mean,
     *,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",  # a string, for numpy.random takes long to import
     level: float = 0.95,
     resamples: int = RESAMPLES,
 ) -> Estimate:

@@ -1,7 +1,6 @@
 """Chances: what is uncertain about what an action is expected to pay."""
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -80,7 +79,6 @@ def verb_of(reward: float) -> str:
     return "pays" if reward > 0.0 else "costs"
 
 
-@dataclass(eq=False, repr=False)
 class PutAt(Finding):
     """The chance that the largest component implies, where one reward or none is ever observed.
 
@@ -105,7 +103,6 @@ class PutAt(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class GiveOrTake(Finding):
     """The standard deviation of an action's whole discounted reward, if it is not `NEGLIGIBLE`."""
 
@@ -125,7 +122,6 @@ class GiveOrTake(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class EitherOr(Finding):
     """A step that pays one amount or nothing; of several, where most of it is expected.
 
@@ -157,7 +153,6 @@ class EitherOr(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class LikelyOver(Finding):
     """The first component at whose beginning the episode has more likely ended than not."""
 
@@ -170,7 +165,6 @@ class LikelyOver(Finding):
         return survival is not None and survival > 0.0 and agrees(self.chance, 1.0 - survival)
 
 
-@dataclass(eq=False, repr=False)
 class SurelyOver(Finding):
     """The same where it has ended for certain."""
 

@@ -1,7 +1,6 @@
 """Contrast: how two actions' futures differ."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -84,7 +83,6 @@ def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
     return (Reasons(better, worse, tuple(sorted(chosen)), advantage, against),)
 
 
-@dataclass(eq=False, repr=False)
 class SameComponents(Finding):
     """Both actions have the same decomposition."""
 
@@ -95,7 +93,6 @@ class SameComponents(Finding):
         return not difference(moment, self.action, self.foil).any()
 
 
-@dataclass(eq=False, repr=False)
 class DoubtfulDifference(Finding):
     """More than half of the difference, Σ|action − foil|, lies in components not to be trusted."""
 
@@ -108,7 +105,6 @@ class DoubtfulDifference(Finding):
         return share > _MOST_DOUBT and agrees(self.share, share)
 
 
-@dataclass(eq=False, repr=False)
 class Dominates(Finding):
     """One action is at least as good in every component, and better in some."""
 
@@ -120,7 +116,6 @@ class Dominates(Finding):
         return len(delta) > 1 and bool((delta >= 0).all()) and bool((delta > 0).any())
 
 
-@dataclass(eq=False, repr=False)
 class Reasons(Finding):
     """The fewest components whose advantage outweighs all that speaks for the worse action.
 

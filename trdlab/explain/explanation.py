@@ -68,7 +68,6 @@ def explain(moment: Moment, action: str | None = None, foil: str | None = None) 
     )
 
 
-@dataclass(eq=False, repr=False)
 class WhoseFuture(Finding):
     """Who acts after the first action, which reward counts, and what ends it."""
 
@@ -80,7 +79,6 @@ class WhoseFuture(Finding):
         return (self.policy, self.reward, self.ending) == astuple(moment.future)
 
 
-@dataclass(eq=False, repr=False)
 class TiedActions(Finding):
     """Several optimal actions tie here, and their futures differ."""
 
@@ -90,7 +88,6 @@ class TiedActions(Finding):
         return len(self.actions) > 1 and self.actions == moment.tied
 
 
-@dataclass(eq=False, repr=False)
 class TiedLater(Finding):
     """Optimal actions tie in later states, and their futures differ."""
 

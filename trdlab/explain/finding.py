@@ -7,7 +7,8 @@ that found it. The numbers it compares may be exact, or `Shown`: read back from 
 import re
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError
-from typing import Any, ClassVar
+from inspect import get_annotations
+from typing import Any, ClassVar, dataclass_transform
 
 from trdlab.arrays import FloatArray
 from trdlab.explain.moment import Moment, same
@@ -33,36 +34,44 @@ def agrees(claimed: float, true: float) -> bool:
     return same(claimed, true) or abs(claimed - true) <= 1e-9 * max(1.0, abs(true))
 
 
+@dataclass_transform(frozen_default=True)
 class Claim:
     """Base class: one small statement and its numbers, which cannot be changed once they are set.
 
-    A direct subclass begins a family, of claims about one kind of evidence; what is derived from it
-    is a kind of claim, unless its name begins with an underscore. Equality and the repr are written
-    here once: dataclass would generate them anew for each kind, which takes longer than all that a
-    claim is used for.
+    The numbers are fields, written as those of a dataclass are. A direct subclass begins a family,
+    of claims about one kind of evidence; what is derived from it is a kind of claim, unless its
+    name begins with an underscore. All of them share the methods here: dataclass would generate
+    them anew for each of some hundred kinds, which takes longer than all that claims are used for.
     """
 
     kinds: ClassVar[dict[str, type["Claim"]]] = {}
+    fields: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
+        own = get_annotations(cls).items()
+        cls.fields += tuple(name for name, of in own if not str(of).startswith("typing.ClassVar"))
         if Claim in cls.__bases__:
             cls.kinds = {}
         elif not cls.__name__.startswith("_"):
             cls.kinds[cls.kind()] = cls
 
+    def __init__(self, *values: Any, **named: Any) -> None:
+        given = dict(zip(self.fields, values, strict=False)) | named
+        if len(given) != len(values) + len(named) or given.keys() != set(self.fields):
+            raise TypeError(f"{type(self).__name__} takes {', '.join(self.fields) or 'nothing'}")
+        self.__dict__.update(given)
+
     def __setattr__(self, name: str, value: object) -> None:
-        if name in self.__dict__:
-            raise FrozenInstanceError(f"the {name} of a finding cannot be changed")
-        super().__setattr__(name, value)
+        raise FrozenInstanceError(f"the {name} of a finding cannot be changed")
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self.__dict__ == other.__dict__
 
     def __hash__(self) -> int:
-        return hash((type(self), *self.__dict__.values()))
+        return hash((type(self), *(self.__dict__[name] for name in self.fields)))
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items())
+        values = ", ".join(f"{name}={self.__dict__[name]!r}" for name in self.fields)
         return f"{type(self).__name__}({values})"
 
     @classmethod
@@ -76,7 +85,7 @@ class Claim:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the kind and the numbers as plain data."""
-        return {"kind": self.kind()} | self.__dict__
+        return {"kind": self.kind()} | {name: self.__dict__[name] for name in self.fields}
 
 
 class Finding(Claim):

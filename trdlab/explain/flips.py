@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from decimal import Decimal
 from itertools import pairwise
 
@@ -122,7 +121,6 @@ def _root(gap: Gap, low: float, high: float, at_low: float, at_high: float) -> f
     return root
 
 
-@dataclass(eq=False, repr=False)
 class Flips(Finding):
     """The values of one quantity at which the preference between two actions flips."""
 
@@ -149,7 +147,6 @@ class Flips(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class NeverFlips(Finding):
     """No flip was found: the preference is the same at all sampled values of one quantity."""
 

@@ -1,7 +1,6 @@
 """Forecast: what one action is expected to pay, and when."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -136,7 +135,6 @@ def _centre(moment: Moment, action: str) -> Iterator[Finding]:
             yield centre
 
 
-@dataclass(eq=False, repr=False)
 class EarnsNothing(Finding):
     """No component of an action differs from zero (see `_speaks_of_all`)."""
 
@@ -146,7 +144,6 @@ class EarnsNothing(Finding):
         return not moment.components(self.action).any() and _speaks_of_all(moment, self.action)
 
 
-@dataclass(eq=False, repr=False)
 class AllBeyond(Finding):
     """All of an action's value lies in the residual (see `_speaks_of_all`)."""
 
@@ -162,7 +159,6 @@ class AllBeyond(Finding):
         return at_end and not row[:-1].any() and row[-1] != 0.0 and agrees(self.value, row[-1])
 
 
-@dataclass(eq=False, repr=False)
 class NothingBefore(Finding):
     """No component of an action differs from zero, of those that a forecast speaks of."""
 
@@ -174,7 +170,6 @@ class NothingBefore(Finding):
         return is_nothing and self.end == explicit_end(moment, self.action) > 0
 
 
-@dataclass(eq=False, repr=False)
 class NextToNothing(Finding):
     """Some components of those that a forecast speaks of differ from zero, but none stands out."""
 
@@ -187,7 +182,6 @@ class NextToNothing(Finding):
         return little and self.end == explicit_end(moment, self.action)
 
 
-@dataclass(eq=False, repr=False)
 class FirstReward(Finding):
     """The first component of its sign that stands out; it is notable if smaller ones precede it."""
 
@@ -209,7 +203,6 @@ class FirstReward(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class FirstStepReward(FirstReward):
     """The same for w = 1, where the discount can be taken out exactly."""
 
@@ -223,7 +216,6 @@ class FirstStepReward(FirstReward):
         )
 
 
-@dataclass(eq=False, repr=False)
 class FirstChance(FirstReward):
     """The same where that step pays, or costs, one amount or nothing."""
 
@@ -240,7 +232,6 @@ class FirstChance(FirstReward):
         )
 
 
-@dataclass(eq=False, repr=False)
 class OffBy(Finding):
     """What forecasts of an action's largest component are off by: the root mean square."""
 
@@ -256,7 +247,6 @@ class OffBy(Finding):
         return self.component == i and agrees(self.error, float(errors[i]))
 
 
-@dataclass(eq=False, repr=False)
 class CentreOfMass(Finding):
     """The mean step of an action's rewards before `end`, weighted by what they are worth now.
 
@@ -280,7 +270,6 @@ class CentreOfMass(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class ShareBeyond(Finding):
     """The share of an action's value that lies in the residual; components of one sign only.
 

@@ -1,6 +1,5 @@
 """Leads: which of two actions is ahead, counted as rewards come in, and when that changes."""
 
-from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import ClassVar
 
@@ -75,7 +74,6 @@ def _crossing(moment: Moment, leader: str, other: str, component: int) -> Findin
     return Overtakes(leader, other, component, sums[0], sums[1])
 
 
-@dataclass(eq=False, repr=False)
 class _Lead(Finding):
     """One running total is the first to lead clearly, and furthest ahead at `last_step`.
 
@@ -128,7 +126,6 @@ class CostsLess(_Lead):
 LEADS = (MoreImmediate, PaysMore, PaysMoreNet, CostsLess)
 
 
-@dataclass(eq=False, repr=False)
 class Overtakes(Finding):
     """The running total of one action passes the other's at an explicit component."""
 
@@ -148,7 +145,6 @@ class Overtakes(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class MakesUp(Finding):
     """The running total of one action passes the other's at the residual."""
 
@@ -165,7 +161,6 @@ class MakesUp(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class StaysAhead(Finding):
     """The running total of one action is never behind, and ahead in the end."""
 

@@ -1,6 +1,6 @@
 """Limits: what of a moment's forecasts lies beyond the range that can be trusted."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,7 +71,6 @@ def limits(moment: Moment) -> tuple[Finding, ...]:
     return next(((claim,) for claim in claims if claim.holds(moment)), ())
 
 
-@dataclass(eq=False, repr=False)
 class TrustedWhole(Finding):
     """Every component is trusted, the residual too."""
 
@@ -79,7 +78,6 @@ class TrustedWhole(Finding):
         return moment.trust is not None and not _doubtful(moment.trust, moment).any()
 
 
-@dataclass(eq=False, repr=False)
 class NowhereTrusted(Finding):
     """No component is trusted, nor is the residual."""
 
@@ -87,7 +85,6 @@ class NowhereTrusted(Finding):
         return moment.trust is not None and bool(_doubtful(moment.trust, moment).all())
 
 
-@dataclass(eq=False, repr=False)
 class NotTrustedAt(Finding):
     """The residual alone is not trusted."""
 
@@ -98,7 +95,6 @@ class NotTrustedAt(Finding):
         return residual and not any(explicit) and self.component == len(explicit) > 0
 
 
-@dataclass(eq=False, repr=False)
 class NotTrustedFrom(Finding):
     """An explicit component is the first that is not trusted, and nothing after it is."""
 
@@ -109,7 +105,6 @@ class NotTrustedFrom(Finding):
         return residual and any(explicit) and explicit.index(True) == self.component > 0
 
 
-@dataclass(eq=False, repr=False)
 class NotTrustedBetween(Finding):
     """An explicit component is the first that is not trusted, yet the residual is."""
 

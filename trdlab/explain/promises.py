@@ -1,7 +1,6 @@
 """Claims about rewards that came as foreseen, and about promises that were not kept."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -23,7 +22,6 @@ SMALLEST_DISCOUNT = 1e-6
 # ---- rewards that came as foreseen ---------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class _Foreseen(StoryClaim):
     """At least half of a reward was expected of the right component, for so many steps on end.
 
@@ -50,7 +48,6 @@ class _Foreseen(StoryClaim):
         return self.steps == steps - 1 >= 1 and is_all == fully
 
 
-@dataclass(eq=False, repr=False)
 class Foreseen(_Foreseen):
     """It was not foreseen any earlier, although it could have been."""
 
@@ -58,7 +55,6 @@ class Foreseen(_Foreseen):
         return self._is_foreseen(played, fully=False)
 
 
-@dataclass(eq=False, repr=False)
 class ForeseenFully(_Foreseen):
     """It was foreseen since the future began, or as far ahead as there are explicit components."""
 
@@ -122,7 +118,6 @@ def _foreseen_steps(episode: Episode) -> tuple[IntArray, IntArray]:
 # ---- promises that were not kept -----------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class _Broken(StoryClaim):
     """A reward stayed k components away from a step to another one, and did not come by then.
 
@@ -165,7 +160,6 @@ class _Broken(StoryClaim):
         return None
 
 
-@dataclass(eq=False, repr=False)
 class BrokenPromise(_Broken):
     """It never came, and the episode ended."""
 
@@ -174,7 +168,6 @@ class BrokenPromise(_Broken):
         return never and played.episode.terminated
 
 
-@dataclass(eq=False, repr=False)
 class OverduePromise(_Broken):
     """It had not come when the episode was cut off."""
 
@@ -183,7 +176,6 @@ class OverduePromise(_Broken):
         return not_yet and not played.episode.terminated
 
 
-@dataclass(eq=False, repr=False)
 class LatePromise(_Broken):
     """It came later."""
 

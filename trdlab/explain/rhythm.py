@@ -1,7 +1,6 @@
 """Rhythm: where what is expected of an action peaks, how sharply, and whether that repeats."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -178,7 +177,6 @@ def _flanks(shares: FloatArray, peak: int) -> tuple[int, int]:
     return first, peak + int(after[0]) - 1 if after.size else len(shares) - 1
 
 
-@dataclass(eq=False, repr=False)
 class Steady(Finding):
     """Each of three or more steps is within `ALIKE` of their mean; w = 1."""
 
@@ -204,7 +202,6 @@ class Steady(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class Peak(Finding):
     """The largest of several components, without their discount, of those before `end`.
 
@@ -231,7 +228,6 @@ class Peak(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class Peaks(Finding):
     """The most prominent of several peaks: their components, and what each is worth now."""
 
@@ -251,7 +247,6 @@ class Peaks(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class Rhythm(Finding):
     """Three or more peaks whose spacings are nearly equal: each is within `UNEVEN` of their mean.
 
@@ -282,7 +277,6 @@ class Rhythm(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class Spread(Finding):
     """The highest peak of what was learned is wider than a step, at half its prominence; w = 1."""
 

@@ -24,7 +24,6 @@ ROUNDING = 1e-9
 # ---- the beginning and the end -------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class ExpectedAtStart(StoryClaim):
     """What was expected in all at the first step, and the largest component of it."""
 
@@ -37,7 +36,6 @@ class ExpectedAtStart(StoryClaim):
         return largest and bool(row.any()) and agrees(self.value, float(row.sum()))
 
 
-@dataclass(eq=False, repr=False)
 class ExpectedInAll(StoryClaim):
     """What was expected at the first step, where there is no explicit component."""
 
@@ -48,7 +46,6 @@ class ExpectedInAll(StoryClaim):
         return len(row) == 1 and bool(row.any()) and agrees(self.value, float(row.sum()))
 
 
-@dataclass(eq=False, repr=False)
 class ExpectedNothing(StoryClaim):
     """No component was expected to hold anything at the first step."""
 
@@ -56,7 +53,6 @@ class ExpectedNothing(StoryClaim):
         return not played.episode.expected[0].any()
 
 
-@dataclass(eq=False, repr=False)
 class NothingChanged(StoryClaim):
     """No step changed what was expected, but for rounding."""
 
@@ -65,7 +61,6 @@ class NothingChanged(StoryClaim):
         return bool(found.size and found.max() <= ROUNDING * played.scale)
 
 
-@dataclass(eq=False, repr=False)
 class LittleChanged(StoryClaim):
     """The most that a step changed."""
 
@@ -77,7 +72,6 @@ class LittleChanged(StoryClaim):
         return changed and agrees(self.most, float(found.max()))
 
 
-@dataclass(eq=False, repr=False)
 class Ended(StoryClaim):
     """The episode terminated after so many steps."""
 
@@ -87,7 +81,6 @@ class Ended(StoryClaim):
         return played.episode.terminated and self.steps == len(played.episode)
 
 
-@dataclass(eq=False, repr=False)
 class CutOff(StoryClaim):
     """The episode was truncated after so many steps."""
 
@@ -97,7 +90,6 @@ class CutOff(StoryClaim):
         return not played.episode.terminated and self.steps == len(played.episode)
 
 
-@dataclass(eq=False, repr=False)
 class _Outcome(StoryClaim):
     """The discounted reward up to the first end, as of the first step."""
 
@@ -110,7 +102,6 @@ class _Outcome(StoryClaim):
         return right and agrees(self.got, _worth(played.episode, self.until))
 
 
-@dataclass(eq=False, repr=False)
 class AsExpected(_Outcome):
     """It is what was expected then, but for rounding."""
 
@@ -118,7 +109,6 @@ class AsExpected(_Outcome):
         return self._is_outcome(played) and _is_as_expected(played, self.until)
 
 
-@dataclass(eq=False, repr=False)
 class OtherThanExpected(_Outcome):
     """It is not what was expected then."""
 

@@ -1,7 +1,6 @@
 """Claims about steps that turned out other than expected, and why."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +14,6 @@ NEARLY = 1 / 4
 """The share of what moved from one step to another by which signs may be mixed there."""
 
 
-@dataclass(eq=False, repr=False)
 class _Turn(StoryClaim):
     """A step, the action taken then, and what the two changed in what was expected."""
 
@@ -37,7 +35,6 @@ class _Turn(StoryClaim):
 # ---- more or less in all -------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class _Surprise(_Turn):
     """A step that turned out better or worse in all, by as much as the revision sums to."""
 
@@ -54,7 +51,6 @@ class _Surprise(_Turn):
         raise NotImplementedError
 
 
-@dataclass(eq=False, repr=False)
 class Surprise(_Surprise):
     """Nothing is known of when, for there is no explicit component."""
 
@@ -62,7 +58,6 @@ class Surprise(_Surprise):
         return len(directed) == 1
 
 
-@dataclass(eq=False, repr=False)
 class EndSurprise(_Surprise):
     """The future ended, which changed more than the reward did."""
 
@@ -77,7 +72,6 @@ class EndSurprise(_Surprise):
         return right and _by_end(played, row, directed) and agrees(self.promised, promised)
 
 
-@dataclass(eq=False, repr=False)
 class RewardSurprise(_Surprise):
     """The reward was another than expected."""
 
@@ -90,7 +84,6 @@ class RewardSurprise(_Surprise):
         return right and came != 0.0 and _by_component(played, row, directed) == 0
 
 
-@dataclass(eq=False, repr=False)
 class NoRewardSurprise(_Surprise):
     """No reward came."""
 
@@ -102,7 +95,6 @@ class NoRewardSurprise(_Surprise):
         return right and _by_component(played, row, directed) == 0
 
 
-@dataclass(eq=False, repr=False)
 class BeliefSurprise(_Surprise):
     """Another reward is expected of a later component than before."""
 
@@ -117,7 +109,6 @@ class BeliefSurprise(_Surprise):
         return agrees(self.was, of.before[row, c]) and agrees(self.now, of.after[row, c])
 
 
-@dataclass(eq=False, repr=False)
 class SpreadSurprise(_Surprise):
     """Many components changed; half of what speaks for the outcome lies at a step or before."""
 
@@ -154,7 +145,6 @@ def _by_component(played: Played, row: int, directed: FloatArray) -> int | None:
 # ---- the same, at another step -------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class Moved(_Turn):
     """As much is expected as before, but rewards, or costs, lie at another step."""
 
@@ -173,7 +163,6 @@ class Moved(_Turn):
         return right and way == self.way and _moving(before, after) == self.things
 
 
-@dataclass(eq=False, repr=False)
 class Exchanged(_Turn):
     """As much is expected as before, but more at one step and less at another."""
 

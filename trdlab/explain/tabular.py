@@ -8,7 +8,6 @@ from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.explain.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
-from trdlab.tabular.models import part_after
 from trdlab.tabular.reach import reached
 from trdlab.tabular.uncertainty import outcomes, spread
 
@@ -92,6 +91,8 @@ def gamma_what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
         table: the exact decomposition.
         state: the index of the state.
     """
+    from trdlab.tabular.models import part_after  # gridworlds do without it
+
     gamma, part = table.time_axis.gamma, part_after(table.mdp, state)
     if part.num_states > MAX_WHAT_IF_STATES:
         return []

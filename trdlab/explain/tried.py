@@ -92,7 +92,6 @@ def _told(trial: Trial, entry: int) -> TrialClaim | None:
     return at[_outcome(came)](more, less, came, said, entry)
 
 
-@dataclass(eq=False, repr=False)
 class TriedOften(TrialClaim):
     """How often each action was tried, from copies of one state."""
 
@@ -108,7 +107,6 @@ class TriedOften(TrialClaim):
         return (self.action, self.foil, self.copies) == who
 
 
-@dataclass(eq=False, repr=False)
 class AlwaysTheSame(TriedOften):
     """The same where all copies of an action brought the same, as far as was seen."""
 
@@ -119,7 +117,6 @@ class AlwaysTheSame(TriedOften):
         return is_same and self._fits(trial)
 
 
-@dataclass(eq=False, repr=False)
 class NotSeen(TriedOften):
     """The copies were cut off before it was seen what came."""
 
@@ -127,7 +124,6 @@ class NotSeen(TriedOften):
         return self._fits(trial) and bool(np.isnan(trial.found.observed.value[-1]))
 
 
-@dataclass(eq=False, repr=False)
 class _Gap(TrialClaim):
     """One action was forecast to pay more than the other; what came of that."""
 
@@ -147,7 +143,6 @@ class _Gap(TrialClaim):
         return all(map(agrees, claimed, true)) and said > 0.0 and _outcome(came) == self.outcome
 
 
-@dataclass(eq=False, repr=False)
 class CameInAll(_Gap):
     """It surely paid more."""
 
@@ -171,7 +166,6 @@ class OpenInAll(CameInAll):
     outcome: ClassVar[Outcome] = "open"
 
 
-@dataclass(eq=False, repr=False)
 class CameAt(_Gap):
     """It surely paid more at a component: that at which it was forecast to be furthest ahead."""
 

@@ -1,7 +1,5 @@
 """Worth: what two actions pay in total, and what that is worth now."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trdlab.explain.finding import Finding, agrees
@@ -45,7 +43,6 @@ def compare_values(moment: Moment, action: str, foil: str) -> Finding:
     return by_discount if by_discount.holds(moment) else Better(*claim)
 
 
-@dataclass(eq=False, repr=False)
 class EqualTotals(Finding):
     """Both actions pay the same in total, undiscounted."""
 
@@ -58,7 +55,6 @@ class EqualTotals(Finding):
         return _close(a, b) and agrees(self.total, a)
 
 
-@dataclass(eq=False, repr=False)
 class DifferentTotals(Finding):
     """One action pays more in total, undiscounted."""
 
@@ -74,7 +70,6 @@ class DifferentTotals(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class NoTotal(Finding):
     """An action has no undiscounted total: its rewards never end."""
 
@@ -84,7 +79,6 @@ class NoTotal(Finding):
         return moment.totals is not None and bool(np.isnan(moment.total(self.action)))
 
 
-@dataclass(eq=False, repr=False)
 class Better(Finding):
     """One action has the larger Q-value."""
 
@@ -105,7 +99,6 @@ class Better(Finding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class BetterByDiscount(Better):
     """The same where the undiscounted totals are equal: only the discount decides."""
 
@@ -113,7 +106,6 @@ class BetterByDiscount(Better):
         return _close(moment.total(self.better), moment.total(self.worse)) and super().holds(moment)
 
 
-@dataclass(eq=False, repr=False)
 class EqualValues(Finding):
     """Both actions have the same Q-value."""
 

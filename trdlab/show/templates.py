@@ -6,9 +6,9 @@ numbers, and holds them against what they speak of.
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from trdlab.errors import TrdlabError
 from trdlab.explain.finding import Claim, Shown
@@ -37,8 +37,7 @@ class UnsupportedSentenceError(TrdlabError):
     """A rendered sentence makes a claim that the numbers do not support."""
 
 
-@dataclass(frozen=True)
-class Form:
+class Form(NamedTuple):
     """How a value in a sentence is shown, recognised, and read back.
 
     Args:
@@ -53,7 +52,7 @@ class Form:
     read: Callable[[str], Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Language(Generic[S]):
     """Sentences for the findings about one kind of subject.
 
@@ -103,8 +102,7 @@ class Language(Generic[S]):
         for kind, template in self.templates.items():
             values = read(template, piece, forms)
             if values is not None:
-                needed = {x.name for x in fields(kind)}  # type: ignore[arg-type]
-                context = {name: value for name, value in given.items() if name in needed}
+                context = {name: value for name, value in given.items() if name in kind.fields}
                 claim = kind(**context | values)
                 yield claim, claim.holds(evidence)
 

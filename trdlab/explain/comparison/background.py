@@ -1,7 +1,5 @@
 """Claims about what a comparison rests on: whom to trust how far, the states, the futures."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trdlab.explain.comparison.differences import ComparisonFinding, side_of
@@ -11,7 +9,6 @@ from trdlab.explain.trust import verdicts
 # ---- who can be trusted -------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class _Trusted(ComparisonFinding):
     """How far the forecasts of one of them can be trusted, as its own report says."""
 
@@ -22,7 +19,6 @@ class _Trusted(ComparisonFinding):
         return report is not None and verdict.holds(report)
 
 
-@dataclass(eq=False, repr=False)
 class TrustedUpTo(_Trusted):
     """Up to a step, and no further."""
 
@@ -32,7 +28,6 @@ class TrustedUpTo(_Trusted):
         return self._says(comparison, verdicts.TrustedTo(self.step))
 
 
-@dataclass(eq=False, repr=False)
 class TrustedAllAlong(_Trusted):
     """Over all explicit components."""
 
@@ -42,7 +37,6 @@ class TrustedAllAlong(_Trusted):
         return self._says(comparison, verdicts.TrustedThroughout(self.step))
 
 
-@dataclass(eq=False, repr=False)
 class TrustedNowhere(_Trusted):
     """At no step, though enough episodes tell of the first one."""
 
@@ -52,7 +46,6 @@ class TrustedNowhere(_Trusted):
         return is_told and self._says(comparison, verdicts.NotTrusted())
 
 
-@dataclass(eq=False, repr=False)
 class TooFewToJudge(_Trusted):
     """At no step, and that is because too few different episodes tell of the first one."""
 
@@ -63,7 +56,6 @@ class TooFewToJudge(_Trusted):
         return few and self._says(comparison, verdicts.NotTrusted())
 
 
-@dataclass(eq=False, repr=False)
 class TrustedUntested(_Trusted):
     """Up to a step, where the reward was always the same, and no further."""
 
@@ -73,7 +65,6 @@ class TrustedUntested(_Trusted):
         return self._says(comparison, verdicts.ConstantTo(self.step))
 
 
-@dataclass(eq=False, repr=False)
 class NeverTested(_Trusted):
     """The reward was always the same in its episodes."""
 
@@ -84,7 +75,6 @@ class NeverTested(_Trusted):
 # ---- what it rests on ---------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class ComparedAt(ComparisonFinding):
     """The states, half of them of the episodes of each."""
 
@@ -95,7 +85,6 @@ class ComparedAt(ComparisonFinding):
         return (self.states, self.episodes) == (len(comparison.visits), comparison.episodes)
 
 
-@dataclass(eq=False, repr=False)
 class SomeCutOff(ComparisonFinding):
     """Some episodes would have gone on, but were not played for longer."""
 
@@ -107,7 +96,6 @@ class SomeCutOff(ComparisonFinding):
         return right and self.episodes > 0
 
 
-@dataclass(eq=False, repr=False)
 class AllAlike(ComparisonFinding):
     """So few of the episodes differ that nothing can be told of others."""
 
@@ -117,7 +105,6 @@ class AllAlike(ComparisonFinding):
         return np.isnan(comparison.gap.low) and self.different == comparison.visits.different
 
 
-@dataclass(eq=False, repr=False)
 class EachTells(ComparisonFinding):
     """Both tell of the same kind of future."""
 
@@ -130,7 +117,6 @@ class EachTells(ComparisonFinding):
         return all((f.policy, f.reward, f.ending) == told for f in comparison.futures)
 
 
-@dataclass(eq=False, repr=False)
 class OneTells(ComparisonFinding):
     """They tell of different kinds, one of them of this."""
 

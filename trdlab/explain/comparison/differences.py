@@ -1,6 +1,5 @@
 """Claims about two agents at the same states: who expects more, when, and how surely."""
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -26,7 +25,6 @@ class ComparisonFinding(Claim):
 # ---- how much -----------------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class NothingDiffers(ComparisonFinding):
     """Every component of every action is the same at every state."""
 
@@ -34,7 +32,6 @@ class NothingDiffers(ComparisonFinding):
         return not comparison.visits.of_any_action.any()
 
 
-@dataclass(eq=False, repr=False)
 class ExpectsMore(ComparisonFinding):
     """One expects more in all, and other episodes would hardly turn that round."""
 
@@ -49,7 +46,6 @@ class ExpectsMore(ComparisonFinding):
         return is_larger and _tells(told, values(comparison))
 
 
-@dataclass(eq=False, repr=False)
 class NeitherSurelyMore(ComparisonFinding):
     """What they expect in all differs, but the other way round in some samples of the episodes."""
 
@@ -62,7 +58,6 @@ class NeitherSurelyMore(ComparisonFinding):
         return gap.value != 0.0 and gap.low <= 0.0 <= gap.high and _tells(told, values(comparison))
 
 
-@dataclass(eq=False, repr=False)
 class SameInAll(ComparisonFinding):
     """They expect the same in all, though not the same everywhere."""
 
@@ -73,7 +68,6 @@ class SameInAll(ComparisonFinding):
         return is_same and agrees(self.value, float(values(comparison)[0]))
 
 
-@dataclass(eq=False, repr=False)
 class OfAnyAction(ComparisonFinding):
     """How far apart they are on average of one and the same action, over all components."""
 
@@ -84,7 +78,6 @@ class OfAnyAction(ComparisonFinding):
         return bool(apart.any()) and agrees(self.distance, float(apart.mean()))
 
 
-@dataclass(eq=False, repr=False)
 class Agreement(ComparisonFinding):
     """The share of states at which they would most likely do the same."""
 
@@ -98,7 +91,6 @@ class Agreement(ComparisonFinding):
 # ---- where in time ------------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class LargestAt(ComparisonFinding):
     """Where the means are furthest apart, if other episodes would not turn that round."""
 
@@ -115,7 +107,6 @@ class LargestAt(ComparisonFinding):
         return is_larger and is_first_largest(size, c) and agrees(self.by, float(size[c]))
 
 
-@dataclass(eq=False, repr=False)
 class _Most(ComparisonFinding):
     """The fewest components in a row that hold most of the difference; of equals the fullest."""
 
@@ -130,7 +121,6 @@ class _Most(ComparisonFinding):
         return bool(is_most and (fewer <= MOST).all()) and agrees(share, float(shares[begin]))
 
 
-@dataclass(eq=False, repr=False)
 class MostAt(_Most):
     """It is one component."""
 
@@ -141,7 +131,6 @@ class MostAt(_Most):
         return self._is_it(comparison, self.component, self.component + 1, self.share)
 
 
-@dataclass(eq=False, repr=False)
 class MostBetween(_Most):
     """They are some explicit ones."""
 
@@ -155,7 +144,6 @@ class MostBetween(_Most):
         return in_range and self._is_it(comparison, self.begin, end, self.share)
 
 
-@dataclass(eq=False, repr=False)
 class MostFrom(_Most):
     """They are the last ones, the residual among them."""
 
@@ -167,7 +155,6 @@ class MostFrom(_Most):
         return self.begin + 1 < end and self._is_it(comparison, self.begin, end, self.share)
 
 
-@dataclass(eq=False, repr=False)
 class _Later(ComparisonFinding):
     """At no step has a larger share of the one's come; the step at which it is smaller by most."""
 
@@ -191,21 +178,18 @@ class _Later(ComparisonFinding):
         return is_behind and lead[end - 1] > 0.0 and _tells(told, shares[:, end - 1])
 
 
-@dataclass(eq=False, repr=False)
 class LaterRewards(_Later):
     """All they expect on average are rewards."""
 
     sign = 1.0
 
 
-@dataclass(eq=False, repr=False)
 class LaterCosts(_Later):
     """All they expect on average are costs."""
 
     sign = -1.0
 
 
-@dataclass(eq=False, repr=False)
 class ComeBy(ComparisonFinding):
     """How much of what each expects has come by the step at which these shares differ most."""
 
@@ -228,7 +212,6 @@ class ComeBy(ComparisonFinding):
 # ---- at which state -----------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class FurthestApart(ComparisonFinding):
     """The state at which what each expects of its own action is furthest apart."""
 

@@ -1,6 +1,5 @@
 """Claims about what is wrong with a forecast, what it hides, and what it was judged by."""
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from trdlab.explain.finding import agrees
@@ -17,7 +16,6 @@ WORTH_SAYING = 0.005
 # ---- what is wrong -------------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class TooLate(TrustFinding):
     """Rewards are predicted some steps too late."""
 
@@ -30,14 +28,12 @@ class TooLate(TrustFinding):
         return self.steps > 0 and shift * report.time_axis.width == self.sign * self.steps
 
 
-@dataclass(eq=False, repr=False)
 class TooEarly(TooLate):
     """Rewards are predicted some steps too early."""
 
     sign: ClassVar[int] = -1
 
 
-@dataclass(eq=False, repr=False)
 class AmountOff(TrustFinding):
     """Surely more, or less, is predicted than comes."""
 
@@ -50,7 +46,6 @@ class AmountOff(TrustFinding):
         return is_off(amount) and agrees(self.times, amount.value)
 
 
-@dataclass(eq=False, repr=False)
 class Smeared(TrustFinding):
     """Neighbouring steps surely share what belongs to one of them."""
 
@@ -58,7 +53,6 @@ class Smeared(TrustFinding):
         return report.blame is not None and report.blame.smear.low > 0.0
 
 
-@dataclass(eq=False, repr=False)
 class DiscountOff(TrustFinding):
     """Components are surely not multiplied by γ^w from one to the next."""
 
@@ -76,7 +70,6 @@ class DiscountOff(TrustFinding):
         )
 
 
-@dataclass(eq=False, repr=False)
 class GoesOnAfterEnd(TrustFinding):
     """What is expected after an end surely counts by more than half."""
 
@@ -88,7 +81,6 @@ class GoesOnAfterEnd(TrustFinding):
         return is_end_ignored(report.audit) and agrees(self.share, report.audit.past_end.value)
 
 
-@dataclass(eq=False, repr=False)
 class GoesOnInNext(GoesOnAfterEnd):
     """So does what is expected at the start of an episode: the next one is mistaken for this."""
 
@@ -99,7 +91,6 @@ class GoesOnInNext(GoesOnAfterEnd):
 # ---- what is hidden, and what it was judged by ---------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class ResidualTrusted(TrustFinding):
     """The residual is surely predicted better than by a constant guess."""
 
@@ -109,7 +100,6 @@ class ResidualTrusted(TrustFinding):
         return self.component == report.time_axis.horizon and _residual_skill(report).low > 0.0
 
 
-@dataclass(eq=False, repr=False)
 class ResidualUnsure(TrustFinding):
     """The residual may be predicted no better than by a constant guess."""
 
@@ -119,7 +109,6 @@ class ResidualUnsure(TrustFinding):
         return self.component == report.time_axis.horizon and _residual_skill(report).low <= 0.0
 
 
-@dataclass(eq=False, repr=False)
 class ResidualUnjudged(TrustFinding):
     """Too few different episodes, or none, came to an end that shows the residual."""
 
@@ -133,7 +122,6 @@ class ResidualUnjudged(TrustFinding):
         return here and unjudged and bool(self.episodes == told.num_episodes[-1])
 
 
-@dataclass(eq=False, repr=False)
 class HiddenValue(TrustFinding):
     """The share of what is predicted that lies in the residual."""
 
@@ -146,7 +134,6 @@ class HiddenValue(TrustFinding):
         return residual and share >= WORTH_SAYING and agrees(self.share, share)
 
 
-@dataclass(eq=False, repr=False)
 class HiddenGap(TrustFinding):
     """The same of the difference between the best action and the next best."""
 
@@ -159,7 +146,6 @@ class HiddenGap(TrustFinding):
         return residual and share >= WORTH_SAYING and agrees(self.share, share)
 
 
-@dataclass(eq=False, repr=False)
 class WouldSuffice(TrustFinding):
     """The least N that leaves no more than a share of the observed rewards to the residual."""
 
@@ -175,7 +161,6 @@ class WouldSuffice(TrustFinding):
         return bool(enough) and agrees(self.share, SHARE)
 
 
-@dataclass(eq=False, repr=False)
 class JudgedOn(TrustFinding):
     """The episodes it was judged by."""
 
@@ -190,7 +175,6 @@ class JudgedOn(TrustFinding):
         return (self.episodes, self.steps) == counts and (self.ended, self.cut) == ends
 
 
-@dataclass(eq=False, repr=False)
 class LivesEnd(TrustFinding):
     """How often a life was lost, where that counts as an end."""
 
@@ -203,14 +187,12 @@ class LivesEnd(TrustFinding):
         return 0 < self.count == told.life_losses and told.life_loss_ends == self.ends
 
 
-@dataclass(eq=False, repr=False)
 class LivesGoOn(LivesEnd):
     """The same where it does not."""
 
     ends: ClassVar[bool] = False
 
 
-@dataclass(eq=False, repr=False)
 class SomeRandom(TrustFinding):
     """The share of random actions, after which nothing was judged."""
 

@@ -1,6 +1,5 @@
 """Claims about how far a forecast can be trusted, and why no further."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -26,7 +25,6 @@ class TrustFinding(Claim):
 # ---- how far ------------------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class TrustedTo(TrustFinding):
     """Every component up to a step is trusted, and the next one is not."""
 
@@ -37,7 +35,6 @@ class TrustedTo(TrustFinding):
         return tested > 0 and passed == _ends(self.step, report) < report.time_axis.horizon
 
 
-@dataclass(eq=False, repr=False)
 class TrustedThroughout(TrustFinding):
     """Every explicit component is trusted."""
 
@@ -48,7 +45,6 @@ class TrustedThroughout(TrustFinding):
         return tested > 0 and passed == _ends(self.step, report) == report.time_axis.horizon
 
 
-@dataclass(eq=False, repr=False)
 class NotTrusted(TrustFinding):
     """No step is to be trusted: the first one already is not."""
 
@@ -57,7 +53,6 @@ class NotTrusted(TrustFinding):
         return passed == 0 < report.time_axis.horizon
 
 
-@dataclass(eq=False, repr=False)
 class ConstantTo(TrustFinding):
     """Up to a step, before the first failure, the reward was always the same, and forecast so."""
 
@@ -69,7 +64,6 @@ class ConstantTo(TrustFinding):
         return tested == 0 < passed < report.time_axis.horizon and here
 
 
-@dataclass(eq=False, repr=False)
 class NothingTested(TrustFinding):
     """The reward was always the same at every step, and forecast so."""
 
@@ -78,7 +72,6 @@ class NothingTested(TrustFinding):
         return tested == 0 and passed == report.time_axis.horizon > 0
 
 
-@dataclass(eq=False, repr=False)
 class CouldReach(TrustFinding):
     """The last step up to which the intervals do not rule trust out."""
 
@@ -96,7 +89,6 @@ class CouldReach(TrustFinding):
 # ---- why no further ------------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class _FirstFailure(TrustFinding):
     """A reason why the first component that is not trusted is not."""
 
@@ -108,7 +100,6 @@ class _FirstFailure(TrustFinding):
         return 0 <= c < len(sure) and bool(sure[:c].all()) and not sure[c]
 
 
-@dataclass(eq=False, repr=False)
 class NoSkillAt(_FirstFailure):
     """It is surely no better than a constant guess."""
 
@@ -117,7 +108,6 @@ class NoSkillAt(_FirstFailure):
         return self._is_first(report) and bool(high[self.component] <= 0.0)
 
 
-@dataclass(eq=False, repr=False)
 class NoSkillFrom(_FirstFailure):
     """So are all the explicit components after it, and there are some."""
 
@@ -126,7 +116,6 @@ class NoSkillFrom(_FirstFailure):
         return self._is_first(report) and c < len(high) - 1 and bool((high[c:] <= 0.0).all())
 
 
-@dataclass(eq=False, repr=False)
 class UnsureAt(_FirstFailure):
     """It may or may not be better than a constant guess."""
 
@@ -135,7 +124,6 @@ class UnsureAt(_FirstFailure):
         return self._is_first(report) and bool(skill.low[c] <= 0.0 < skill.high[c])
 
 
-@dataclass(eq=False, repr=False)
 class WrongAt(_FirstFailure):
     """The reward was always the same, and the forecast is another."""
 
@@ -144,7 +132,6 @@ class WrongAt(_FirstFailure):
         return self._is_first(report) and bool(constant[self.component])
 
 
-@dataclass(eq=False, repr=False)
 class TooFewAt(_FirstFailure):
     """Too few different episodes tell of it."""
 
@@ -156,7 +143,6 @@ class TooFewAt(_FirstFailure):
         return few and bool(self.episodes == calibration.num_episodes[c])
 
 
-@dataclass(eq=False, repr=False)
 class NothingToPredict(TrustFinding):
     """How many of the explicit components had the same reward always."""
 
@@ -168,7 +154,6 @@ class NothingToPredict(TrustFinding):
         return bool(0 < self.count == constant.sum() < len(constant) == self.total)
 
 
-@dataclass(eq=False, repr=False)
 class UnknownAt(_FirstFailure):
     """It is not known of any step what followed."""
 
@@ -180,7 +165,6 @@ class UnknownAt(_FirstFailure):
 # ---- what can be known ---------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class NoChance(TrustFinding):
     """No two copies of a state ever went differently."""
 
@@ -188,7 +172,6 @@ class NoChance(TrustFinding):
         return report.ceiling is not None and report.ceiling.deterministic
 
 
-@dataclass(eq=False, repr=False)
 class CannotBeKnown(TrustFinding):
     """A perfect forecast of a component would surely have little skill; never less than none."""
 
@@ -200,7 +183,6 @@ class CannotBeKnown(TrustFinding):
         return limit.high < LITTLE and agrees(self.at_most, max(limit.high, 0.0))
 
 
-@dataclass(eq=False, repr=False)
 class IsNotKnown(TrustFinding):
     """A perfect forecast of a component would surely have more skill."""
 
@@ -214,7 +196,6 @@ class IsNotKnown(TrustFinding):
         return same and limit.high >= LITTLE and skill.high < limit.low
 
 
-@dataclass(eq=False, repr=False)
 class AsGoodAsCanBe(TrustFinding):
     """The skill of a component is not surely less than that of a perfect forecast."""
 
@@ -230,7 +211,6 @@ class AsGoodAsCanBe(TrustFinding):
 # ---- of other actions ----------------------------------------------------------------------------
 
 
-@dataclass(eq=False, repr=False)
 class FoilsTrustedTo(TrustFinding):
     """Forecasts of actions that the policy would not have taken are trusted up to a step."""
 
@@ -243,7 +223,6 @@ class FoilsTrustedTo(TrustFinding):
         return tested > 0 and passed == _ends(self.step, report) < report.time_axis.horizon
 
 
-@dataclass(eq=False, repr=False)
 class FoilsTrustedThroughout(TrustFinding):
     """They are trusted at every explicit component."""
 
@@ -256,7 +235,6 @@ class FoilsTrustedThroughout(TrustFinding):
         return tested > 0 and passed == _ends(self.step, report) == report.time_axis.horizon
 
 
-@dataclass(eq=False, repr=False)
 class FoilsNotTrusted(TrustFinding):
     """They are trusted at no step: the first one is surely no better than a guess, or wrong."""
 
@@ -264,7 +242,6 @@ class FoilsNotTrusted(TrustFinding):
         return report.time_axis.horizon > 0 and _foils_fail(report) == "surely"
 
 
-@dataclass(eq=False, repr=False)
 class FoilsUnjudged(TrustFinding):
     """Too little was seen of them to tell whether the first step can be trusted."""
 

@@ -13,7 +13,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.explain.episodes import AS_PAID, Counting
 from trdlab.explain.playing import Playing, Policy, Progress, Watch, decide, unwatched
-from trdlab.explain.trust.followed import Samples
+from trdlab.explain.trust.followed import Samples, all_or_none
 
 
 class TooFewMoments(InputError):  # noqa: N818  it says what episodes are, not what failed
@@ -262,6 +262,7 @@ class Branching:
         arrays: dict[str, Any] = {
             name: np.concatenate([getattr(part, name) for part in found])[order] for name in names
         }
+        arrays["known"] = all_or_none(arrays["known"])
         return replace(found[0], **arrays, num_episodes=num_episodes)
 
 

@@ -98,6 +98,10 @@ TEMPLATES: dict[type[Claim], str] = {
         "What lies at {component:label} cannot be judged: {episodes:count} different episodes "
         "show it."
     ),
+    shortcomings.ResidualCut: (
+        "What lies at {component:label} cannot be judged, with {cut:episodes} cut off: only the "
+        "short ones show it."
+    ),
     shortcomings.WouldSuffice: (
         "N = {horizon:count} would leave no more than {share:percent} of the rewards beyond."
     ),

@@ -130,6 +130,16 @@ def test_what_a_truncation_cut_off_is_not_known():
     assert grouped.tolist() == [[True, False], [True, False], [False, False]]
 
 
+def test_of_a_residual_the_short_episodes_alone_tell_nothing():
+    axis = TimeAxis(0.5, 1)
+    ended = [episode([1.0, 1.0, 1.0 + i], axis) for i in range(12)]
+    long = episode([1.0] * 9, axis, terminated=False)
+    assert pool(ended).known.all()
+    assert not pool([*ended, long]).known[:, -1].any()
+    assert hidden(ended).observed_tails.size > 0
+    assert hidden([*ended, long]).observed_tails.size == 0, "nor does the N that would suffice"
+
+
 def test_beyond_a_time_limit_nothing_is_known_even_if_the_episode_ended_in_time():
     _, known = what_followed(episode([1.0, 1.0, 1.0], TimeAxis(0.5, 2), time_limit=3))
     assert known.tolist() == [[True, True, True], [True, True, True], [True, False, True]]

@@ -14,6 +14,7 @@ from trdlab.explain.trust.shortcomings import (
     JudgedOn,
     LivesEnd,
     LivesGoOn,
+    ResidualCut,
     ResidualTrusted,
     ResidualUnjudged,
     ResidualUnsure,
@@ -140,6 +141,7 @@ def _residual(report: TrustReport) -> Findings:
         ResidualTrusted(residual),
         ResidualUnsure(residual),
         ResidualUnjudged(residual, episodes),
+        ResidualCut(residual, report.endings.truncated),
     ]
     if value > SHARE and least is not None:
         claims.append(WouldSuffice(least, SHARE))

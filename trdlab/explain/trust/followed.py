@@ -55,7 +55,8 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
       beyond it, even where the episode ended in time: otherwise, of the last steps only those that
       ended would count, and an end would look likelier than it is;
     - what came after a random action, which the prediction does not speak of;
-    - the residual, unless the episode came to an end; with ε > 0 it is never known.
+    - the residual, unless the episode came to an end; with ε > 0 it is never known. (Of several
+      episodes it is known only if it is of all of their steps, see `pool`.)
     """
     axis, total, far = episode.time_axis, len(episode), np.iinfo(np.int64).max
     steps, starts = np.arange(axis.num_steps), np.arange(total)
@@ -85,6 +86,9 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
 def pool(episodes: Sequence[Episode]) -> Samples:
     """Returns every step of some episodes as a sample.
 
+    Where the residual of some step is not known, it counts as known of none: the others are those
+    that ended early, from which nothing can be told of those that went on.
+
     Raises:
         InputError: there are no episodes, or they are of different time axes.
     """
@@ -94,10 +98,17 @@ def pool(episodes: Sequence[Episode]) -> Samples:
         time_axis=time_axis,
         predicted=np.concatenate([episode.predicted for episode in episodes]).astype(np.float64),
         observed=np.concatenate(observed),
-        known=np.concatenate(known),
+        known=all_or_none(np.concatenate(known)),
         episode=np.repeat(np.arange(len(episodes)), [len(episode) for episode in episodes]),
         num_episodes=len(episodes),
     )
+
+
+def all_or_none(known: BoolArray) -> BoolArray:
+    """Returns what is known `[M, N+1]`, of the residual only if it is known of all M."""
+    known = known.copy()
+    known[:, -1] = known[:, -1].all()
+    return known
 
 
 def common_axis(episodes: Sequence[Episode]) -> TimeAxis:

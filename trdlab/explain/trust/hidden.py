@@ -31,7 +31,7 @@ class Hidden:
         tails: `[N+1]`, the share of the predicted components from each one on; the last of them
             is `value`.
         observed_tails: `[L]`, the share of the discounted rewards that came 0, 1, … steps later or
-            after that, of those whose future is known; empty if no reward came.
+            after that; empty if no reward came, or some episode was cut off.
     """
 
     time_axis: TimeAxis
@@ -134,7 +134,9 @@ def _tails(sums: FloatArray) -> FloatArray:
 
 
 def _observed_tails(episodes: Sequence[Episode], gamma: float) -> FloatArray:
-    """Returns `[L]`, from all steps after which an end was seen."""
+    """Returns `[L]`, of all steps; nothing where some were cut off, for these are the long ones."""
+    if any(not episode.ends[-1] for episode in episodes):
+        return np.zeros(0)
     longest = max(len(episode) for episode in episodes)
     sums = np.zeros(longest + 1)
     for episode in episodes:

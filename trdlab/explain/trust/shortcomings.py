@@ -117,9 +117,22 @@ class ResidualUnjudged(TrustFinding):
 
     def holds(self, report: TrustReport) -> bool:
         told = report.calibration
-        unjudged = told.states[-1] in ("too few episodes", "unknown")
+        is_cut = told.states[-1] == "unknown" and report.endings.truncated > 0
+        unjudged = told.states[-1] in ("too few episodes", "unknown") and not is_cut
         here = self.component == report.time_axis.horizon
         return here and unjudged and bool(self.episodes == told.num_episodes[-1])
+
+
+class ResidualCut(TrustFinding):
+    """Some episodes were cut off, and those that ended are the short ones."""
+
+    component: int
+    cut: int
+
+    def holds(self, report: TrustReport) -> bool:
+        here = self.component == report.time_axis.horizon
+        unknown = report.calibration.states[-1] == "unknown"
+        return here and unknown and 0 < self.cut == report.endings.truncated
 
 
 class HiddenValue(TrustFinding):

@@ -7,20 +7,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.explain.comparison.report import Comparison
 from trdlab.explain.trust.intervals import Estimates
 from trdlab.show.comparison import titles
 from trdlab.show.pictures import check_pictures
+from trdlab.show.steps_axis import STEPS, cut_off, label_steps, positions, room_for
 from trdlab.time_axis import axis_title
 
 NAME = "comparison.png"
 
 _COLOURS = ("#1f4e8c", "#e39a2d")  # dark for A, light for B
 _MUTED = "#5b6470"
-_GAP = 0.6  # between the explicit components and the residual
-_MOST_LETTERS = 70  # beneath the picture
 
 
 def picture_path(folder: Path) -> Path:
@@ -50,8 +48,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     count = f"{len(comparison.visits)} states of {2 * comparison.episodes} episodes"
     whiskers = "whiskers: 95 % intervals" if has_intervals else "too few for intervals"
     figure.supxlabel(
-        f"agent steps from now (t is the action taken now)\n{axis_title(comparison.time_axis)} · "
-        f"{count} · {whiskers}",
+        f"{STEPS}\n{axis_title(comparison.time_axis)} · {count} · {whiskers}",
         fontsize=8,
         color=_MUTED,
     )
@@ -75,7 +72,12 @@ def plot_means(ax: Axes, comparison: Comparison) -> Axes:
         _bars(ax, own, axis, (_COLOURS[i],) * axis.num_components, 0.4 * i - 0.2, 0.38)
         handles.append(Patch(color=_COLOURS[i], label=f"{title} ({totals[i]:.3g} in all)"))
     ax.legend(handles=handles, fontsize=8, frameon=False)
-    return _dressed(ax, axis)
+    _dressed(ax, axis)
+    room, x = room_for(means.value), float(positions(axis)[-1])
+    if room is not None:
+        ends = means.value[:, -1].tolist()
+        cut_off(ax, room, [(x + 0.4 * i - 0.2, value) for i, value in enumerate(ends)])
+    return ax
 
 
 def plot_difference(ax: Axes, comparison: Comparison) -> Axes:
@@ -92,7 +94,11 @@ def plot_difference(ax: Axes, comparison: Comparison) -> Axes:
     colours = tuple(_COLOURS[int(value > 0.0)] for value in difference.value)
     _bars(ax, difference, axis, colours, 0.0, 0.6)
     ax.set_title("B − A: up where B expects more", fontsize=9, loc="left", color=_MUTED)
-    return _dressed(ax, axis)
+    _dressed(ax, axis)
+    room = room_for(difference.value[None])
+    if room is not None:
+        cut_off(ax, room, [(float(positions(axis)[-1]), float(difference.value[-1]))])
+    return ax
 
 
 def _bars(
@@ -103,7 +109,7 @@ def _bars(
     offset: float,
     width: float,
 ) -> None:
-    x = _positions(axis) + offset
+    x = positions(axis) + offset
     explicit, residual = list(colours[:-1]), colours[-1]
     ax.bar(x[:-1], found.value[:-1], width, color=explicit)
     ax.bar(x[-1:], found.value[-1:], width, fc="white", ec=residual, hatch="////")
@@ -114,17 +120,8 @@ def _bars(
     )
 
 
-def _positions(axis: TimeAxis) -> FloatArray:
-    positions = np.arange(axis.num_components, dtype=np.float64)
-    positions[-1] += _GAP if axis.horizon else 0.0
-    return positions
-
-
 def _dressed(ax: Axes, axis: TimeAxis) -> Axes:
-    every = -(-sum(map(len, axis.labels)) // _MOST_LETTERS)
-    shown = [i for i in range(0, axis.horizon, every) if axis.horizon - i >= every / 2]
-    shown.append(axis.horizon)
-    ax.set_xticks(_positions(axis)[shown], [axis.label(i) for i in shown])
+    label_steps(ax, axis, positions(axis))
     ax.axhline(0.0, color="black", linewidth=0.8)
     ax.spines[["top", "right"]].set_visible(False)
     ax.tick_params(labelsize=8)

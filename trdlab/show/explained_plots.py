@@ -21,9 +21,9 @@ from trdlab.show.plots import (
     plot_components,
     plot_contrast,
     plot_uncertainty,
-    share_scale,
     whiskers,
 )
+from trdlab.show.steps_axis import cut_off, positions, room_for, share_scale
 from trdlab.show.story_plots import story_figure
 from trdlab.show.trust import plot_trust
 from trdlab.time_axis import axis_title
@@ -34,7 +34,6 @@ _FADED = 0.25
 _WIDTH = 8.0
 _PANEL = 2.2
 _FOOT = 0.5  # inches
-_SWAMPS = 4.0  # times the largest explicit component, from which on a residual is cut off
 
 
 def picture_paths(
@@ -120,8 +119,8 @@ def moment_figure(
         if trial is not None:
             plot_trial(axes[-1], trial)
         share_scale(axes[:-1])
-        leave_room([axes[-1]], difference(moment, action, foil)[None])
-    leave_room(axes[: len(names)], np.stack([moment.components(name) for name in names]))
+        _cut_residuals(axes[-1:], moment, [difference(moment, action, foil)])
+    _cut_residuals(axes[: len(names)], moment, [moment.components(name) for name in names])
     for ax, of in zip(axes, (*([name] for name in names), names), strict=False):
         fade(ax, moment, of)
         if ax is not axes[-1]:
@@ -131,36 +130,12 @@ def moment_figure(
     return figure
 
 
-def leave_room(axes: Sequence[Axes], rows: FloatArray) -> None:
-    """Cuts residuals off where the explicit components could not be seen beside them.
-
-    Args:
-        axes: with the bars of a row each, on one scale.
-        rows: `[len(axes), N+1]`.
-    """
-    residual, largest = rows[:, -1], float(np.abs(rows[:, :-1]).max(initial=0.0))
-    if largest == 0.0 or np.abs(residual).max() <= _SWAMPS * largest:
-        return
-    low = -largest * (1.5 if rows.min() < 0.0 else 0.05)
-    high = largest * (1.5 if rows.max() > 0.0 else 0.05)
-    for ax, value in zip(axes, residual, strict=True):
-        ax.set_ylim(low, high)
-        if low <= value <= high:
-            continue
-        bar = list(ax.patches)[-1]
-        box = bar.get_path().get_extents(bar.get_patch_transform())
-        up = value > 0.0
-        ax.annotate(
-            f"{'↑' if up else '↓'} {value:.4g}",
-            (0.5 * (box.x0 + box.x1), 1.0 if up else 0.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, -2 if up else 2),
-            textcoords="offset points",
-            ha="center",
-            va="top" if up else "bottom",
-            fontsize=8,
-            bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.6},
-        )
+def _cut_residuals(axes: Sequence[Axes], moment: Moment, rows: Sequence[FloatArray]) -> None:
+    """Cuts residuals off beside which the bars of `rows`, one for each axes, cannot be seen."""
+    room, x = room_for(np.stack(rows)), float(positions(moment.time_axis)[-1])
+    if room is not None:
+        for ax, row in zip(axes, rows, strict=True):
+            cut_off(ax, room, [(x, float(row[-1]))])
 
 
 def fade(ax: Axes, moment: Moment, actions: Sequence[str]) -> Axes:

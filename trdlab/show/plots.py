@@ -4,7 +4,6 @@ Actions are told apart by hue, lightness and hatching at once, so that pictures 
 and colour-blindness. Steps run to the right; the residual stands apart, hatched.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from trdlab.gridworld.gridmap import MOVES
 from trdlab.gridworld.render import draw_map
 from trdlab.show.gridworld import GridworldReport
 from trdlab.show.report import Report, Scene
+from trdlab.show.steps_axis import STEPS, label_steps, positions, share_scale
 from trdlab.tabular import ExactTable
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
@@ -32,10 +32,8 @@ _ACTION = "#1f4e8c"  # dark; its route is solid
 _FOIL = "#e39a2d"  # light; its route is dashed
 _MUTED = "#5b6470"
 _POLICY = "#2f7d4f"
-_GAP = 0.6  # between the explicit components and the residual, in bars
 _MOST_NUMBERS = 9  # written at the bars
 _MOST_LABELS = 12
-_MOST_LETTERS = 70  # beneath one picture
 _MOST_ROUTE_STEPS = 1_000
 _POINT = 1.25 / 330  # a point of a line's height, as a share of the panel's
 
@@ -227,13 +225,13 @@ def plot_components(ax: Axes, components: FloatArray, axis: TimeAxis, *, colour:
     Returns:
         `ax`.
     """
-    positions = _positions(axis)
-    ax.bar(positions[:-1], components[:-1], color=colour, width=0.8)
-    ax.bar(positions[-1:], components[-1:], fc="white", ec=colour, hatch="////", width=0.8)
+    places = positions(axis)
+    ax.bar(places[:-1], components[:-1], color=colour, width=0.8)
+    ax.bar(places[-1:], components[-1:], fc="white", ec=colour, hatch="////", width=0.8)
     ax.axhline(0.0, color="black", linewidth=0.8)
     decimals = decimals_for(components)
     if axis.num_components <= _MOST_NUMBERS:
-        for x, y in zip(positions, components, strict=True):
+        for x, y in zip(places, components, strict=True):
             ax.annotate(
                 number(float(y), decimals),
                 (x, y),
@@ -245,7 +243,8 @@ def plot_components(ax: Axes, components: FloatArray, axis: TimeAxis, *, colour:
                 bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.6},
                 zorder=5,
             )
-    _label_steps(ax, positions, axis)
+    label_steps(ax, axis, places)
+    ax.set_xlabel(STEPS, fontsize=9, color=_MUTED)
     ax.margins(y=0.2)
     ax.spines[["top", "right"]].set_visible(False)
     ax.tick_params(labelsize=8)
@@ -267,16 +266,14 @@ def plot_uncertainty(ax: Axes, moment: Moment, action: str) -> Axes:
     Returns:
         `ax`.
     """
-    a, positions = moment.index(action), _positions(moment.time_axis)
+    a, places = moment.index(action), positions(moment.time_axis)
     means, length = moment.components(action), _lengths(moment)[a]
     shown = length > 0.0  # not so if it is NaN
-    ax.errorbar(
-        positions[shown], means[shown], length[shown], fmt="none", ecolor="black", capsize=2.0
-    )
+    ax.errorbar(places[shown], means[shown], length[shown], fmt="none", ecolor="black", capsize=2.0)
     if moment.uncertainty is not None and moment.uncertainty.survival[a, -1] < 1.0:
         right = ax.twinx()
         right.step(
-            positions, moment.uncertainty.survival[a], where="mid", color=_POLICY, linewidth=1.0
+            places, moment.uncertainty.survival[a], where="mid", color=_POLICY, linewidth=1.0
         )
         right.set(ylim=(0.0, 1.15), yticks=(0.0, 0.5, 1.0))
         right.set_ylabel("still running", fontsize=8, color=_POLICY)
@@ -327,13 +324,6 @@ def plot_contrast(ax: Axes, moment: Moment, action: str, foil: str) -> Axes:
     return ax
 
 
-def _positions(axis: TimeAxis) -> FloatArray:
-    """Returns where the bars stand: in a row, the residual set apart."""
-    positions = np.arange(axis.num_components, dtype=np.float64)
-    positions[-1] += _GAP if axis.horizon else 0.0
-    return positions
-
-
 def _title(moment: Moment, action: str) -> str:
     total = moment.total(action)
     undiscounted = "" if np.isnan(total) else f", {amount(total)} undiscounted"
@@ -342,20 +332,3 @@ def _title(moment: Moment, action: str) -> str:
 
 def _short(value: float) -> str:
     return number(value, decimals_for([value]))
-
-
-def _label_steps(ax: Axes, positions: FloatArray, axis: TimeAxis) -> None:
-    labels = axis.labels
-    every = -(-sum(map(len, labels)) // _MOST_LETTERS)
-    shown = [i for i in range(axis.horizon) if i % every == 0 and axis.horizon - i >= every / 2]
-    shown.append(axis.horizon)
-    ax.set_xticks(positions[shown], [labels[i] for i in shown])
-    ax.set_xlabel("agent steps from now (t is the action taken now)", fontsize=9, color=_MUTED)
-
-
-def share_scale(axes: Sequence[Axes]) -> None:
-    """Gives all axes the same range of values."""
-    low = min(ax.get_ylim()[0] for ax in axes)
-    high = max(ax.get_ylim()[1] for ax in axes)
-    for ax in axes:
-        ax.set_ylim(low, high)

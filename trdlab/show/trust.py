@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 
 from trdlab.arrays import FloatArray
 from trdlab.explain.trust.report import TrustReport
+from trdlab.show.steps_axis import STEPS, label_steps, positions
 from trdlab.time_axis import axis_title, step_label
 
 _SKILL = "#1f4e8c"  # dark, solid, with dots
@@ -15,7 +16,6 @@ _MUTED = "#5b6470"
 _TRUSTED = "#dfeade"
 _LOWEST = -0.5  # skill below this is shown as an arrow at the edge
 _GAP = 1.0  # between the explicit components and the residual, in components
-_MOST_LETTERS = 70  # beneath one picture
 
 
 def plot_trust(ax: Axes, report: TrustReport) -> Axes:
@@ -33,8 +33,7 @@ def plot_trust(ax: Axes, report: TrustReport) -> Axes:
         `ax`.
     """
     axis, found = report.time_axis, report.calibration
-    x = np.arange(axis.num_components, dtype=np.float64)
-    x[-1] += _GAP if axis.horizon else 0.0
+    x = positions(axis, _GAP)
     _shade(ax, report)
     ax.axhline(0.0, color="black", linewidth=0.8)
     if report.ceiling is not None:
@@ -102,12 +101,9 @@ def _mark(ax: Axes, x: FloatArray, marker: str, label: str) -> None:
 
 def _dress(ax: Axes, report: TrustReport, x: FloatArray) -> None:
     axis = report.time_axis
-    every = -(-sum(map(len, axis.labels)) // _MOST_LETTERS)
-    shown = [i for i in range(0, axis.horizon, every) if axis.horizon - i >= every / 2]
-    shown.append(axis.horizon)
-    ax.set_xticks(x[shown], [axis.label(i) for i in shown])
+    label_steps(ax, axis, x)
     ax.set(xlim=(-0.6, x[-1] + 0.6), ylim=(_LOWEST, 1.12), yticks=(-0.5, 0.0, 0.5, 1.0))
-    ax.set_xlabel("agent steps from now (t is the action taken now)", fontsize=9, color=_MUTED)
+    ax.set_xlabel(STEPS, fontsize=9, color=_MUTED)
     ax.set_ylabel("skill (1: perfect,\n0: a constant guess)", fontsize=9, color=_MUTED)
     ax.set_title(
         f"{axis_title(axis)} · {report.num_episodes} episodes",

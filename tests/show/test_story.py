@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Episode, collect
-from trdlab.explain.played import Played, StoryClaim
-from trdlab.explain.promises import foreseen
-from trdlab.explain.story import tell
-from trdlab.explain.surprises import sizes, surprise
+from trdlab.explain.stories.played import Played, StoryClaim
+from trdlab.explain.stories.promises import foreseen
+from trdlab.explain.stories.story import tell
+from trdlab.explain.stories.surprises import sizes, surprise
 from trdlab.explain.trust.followed import what_followed
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.show import UnsupportedSentenceError

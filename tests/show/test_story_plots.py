@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explain.episodes import Episode
-from trdlab.explain.played import Played
-from trdlab.explain.story import tell
+from trdlab.explain.stories.played import Played
+from trdlab.explain.stories.story import tell
 from trdlab.explain.trust.trusted import Trust
 from trdlab.show.story_plots import plot_story, story_figure
 

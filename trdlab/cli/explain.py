@@ -84,8 +84,8 @@ def explain(
 ) -> None:
     """Say what an agent expects, when, and how far that can be trusted.
 
-    It plays an episode as the agent would, and explains one step of it. How far such forecasts can
-    be trusted is judged by other episodes.
+    It plays an episode as the agent would, and explains one step of it.
+    How far such forecasts can be trusted is judged by other episodes.
     """
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.decomposition import TimeAxis

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from trdlab.explain.counterfactual import Counterfactual
     from trdlab.explain.episodes import Counting, Episode, collect
     from trdlab.explain.explained import Explained, explain_agent
-    from trdlab.explain.played import Played, play
     from trdlab.explain.playing import play_to
-    from trdlab.explain.revision import Revision, revise
-    from trdlab.explain.story import Story, tell
+    from trdlab.explain.stories.played import Played, play
+    from trdlab.explain.stories.revision import Revision, revise
+    from trdlab.explain.stories.story import Story, tell
     from trdlab.explain.trust.calibration import Calibration, calibrate
     from trdlab.explain.trust.ceiling import Ceiling
     from trdlab.explain.trust.findings import trust_findings
@@ -104,12 +104,12 @@ _HOMES = {
     "collect": "episodes",
     "Explained": "explained",
     "explain_agent": "explained",
-    "Played": "played",
-    "play": "played",
-    "Revision": "revision",
-    "revise": "revision",
-    "Story": "story",
-    "tell": "story",
+    "Played": "stories.played",
+    "play": "stories.played",
+    "Revision": "stories.revision",
+    "revise": "stories.revision",
+    "Story": "stories.story",
+    "tell": "stories.story",
     "trust_findings": "trust.findings",
     "TrustReport": "trust.report",
     "judge": "trust.report",

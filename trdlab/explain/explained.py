@@ -8,9 +8,9 @@ from trdlab.explain.agents import Agent
 from trdlab.explain.assessment import assess, try_out
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.limits import judged
-from trdlab.explain.played import play
 from trdlab.explain.playing import Watch, unwatched, usual_limit
-from trdlab.explain.story import Story, tell
+from trdlab.explain.stories.played import play
+from trdlab.explain.stories.story import Story, tell
 from trdlab.explain.tried import Trial
 from trdlab.explain.trust.report import TrustReport
 from trdlab.time_axis import TimeAxis

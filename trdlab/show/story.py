@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from trdlab.explain import promises, story, surprises
 from trdlab.explain.finding import Claim, Shown
-from trdlab.explain.played import Played, StoryClaim
-from trdlab.explain.story import Story, first_end
+from trdlab.explain.stories import promises, story, surprises
+from trdlab.explain.stories.played import Played, StoryClaim
+from trdlab.explain.stories.story import Story, first_end
 from trdlab.formatting import amount, number
 from trdlab.show.templates import Form, Language, forms_of
 from trdlab.show.trust_data import plain_data

@@ -12,8 +12,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 
 from trdlab.arrays import FloatArray
-from trdlab.explain.promises import Broken
-from trdlab.explain.story import Story
+from trdlab.explain.stories.promises import Broken
+from trdlab.explain.stories.story import Story
 from trdlab.explain.trust.trusted import Trust
 from trdlab.show.story import story_sentence
 from trdlab.time_axis import axis_title

@@ -8,7 +8,7 @@ import numpy as np
 from trdlab.arrays import IntArray
 from trdlab.explain.episodes import Episode
 from trdlab.explain.finding import agrees
-from trdlab.explain.played import Played, StoryClaim
+from trdlab.explain.stories.played import Played, StoryClaim
 from trdlab.explain.trust.followed import next_flag
 
 HALF = 0.5

@@ -7,9 +7,9 @@ import numpy as np
 from trdlab.explain.episodes import Episode
 from trdlab.explain.finding import agrees
 from trdlab.explain.moment import same
-from trdlab.explain.played import Played, StoryClaim
-from trdlab.explain.promises import broken_promises, foreseen
-from trdlab.explain.surprises import sizes, surprise
+from trdlab.explain.stories.played import Played, StoryClaim
+from trdlab.explain.stories.promises import broken_promises, foreseen
+from trdlab.explain.stories.surprises import sizes, surprise
 
 MOMENTS = 5
 """How many moments of an episode are told."""

@@ -11,8 +11,8 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Episode, collect
-from trdlab.explain.played import Played
-from trdlab.explain.promises import (
+from trdlab.explain.stories.played import Played
+from trdlab.explain.stories.promises import (
     BrokenPromise,
     Foreseen,
     ForeseenFully,
@@ -21,8 +21,8 @@ from trdlab.explain.promises import (
     broken_promises,
     foreseen,
 )
-from trdlab.explain.story import AsExpected, OtherThanExpected, key_rows, tell
-from trdlab.explain.surprises import (
+from trdlab.explain.stories.story import AsExpected, OtherThanExpected, key_rows, tell
+from trdlab.explain.stories.surprises import (
     BeliefSurprise,
     EndSurprise,
     Moved,

@@ -9,8 +9,8 @@ import pytest
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Episode, collect
-from trdlab.explain.played import Played
-from trdlab.explain.revision import revise
+from trdlab.explain.stories.played import Played
+from trdlab.explain.stories.revision import revise
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import exact
 

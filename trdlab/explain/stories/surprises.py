@@ -6,7 +6,7 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.explain.finding import agrees
-from trdlab.explain.played import Played, StoryClaim
+from trdlab.explain.stories.played import Played, StoryClaim
 
 FOCUS = 1 / 3
 """The share of a surprise that one component must account for, to be named as its reason."""

@@ -7,7 +7,7 @@ import numpy as np
 from trdlab.explain.agents import Agent
 from trdlab.explain.episodes import Episode
 from trdlab.explain.finding import Claim
-from trdlab.explain.revision import Revision, revise
+from trdlab.explain.stories.revision import Revision, revise
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from trdlab.explain.agents import Agent
 from trdlab.explain.assessment import assess, try_out
 from trdlab.explain.explanation import Explanation, explain
 from trdlab.explain.limits import judged
+from trdlab.explain.moment import Moment
 from trdlab.explain.playing import Watch, unwatched, usual_limit
 from trdlab.explain.stories.played import play
 from trdlab.explain.stories.story import Story, tell
@@ -107,32 +108,51 @@ def explain_agent(
             by where calibration was asked for.
     """
     wanted = parts or PARTS
-    if max_steps is not None and step >= max_steps:
-        raise InputError(
-            f"There is no step {step} in {max_steps} steps.", "Choose another --max-steps."
-        )
-    limit = max(usual_limit(agent.estimator.time_axis), step + 1)
-    limit = limit if max_steps is None else max_steps
-    is_of_moment = any(FIELDS[part] for part in wanted)
-    moment = agent.moment(seed=seed, step=step) if is_of_moment else None
-    chosen = None if action is None else agent.action(action)
-    other = None if foil is None else agent.action(foil)
-    pair = None if moment is None else moment.pair(chosen, other)  # fails before what takes long
-    if "contrast" in parts and pair is not None and pair[1] is None:
+    limit = _limit(agent, step, max_steps)
+    moment = None
+    if any(FIELDS[part] for part in wanted):
+        moment = agent.moment(seed=seed, step=step)
+    pair = (None, None) if moment is None else _pair(agent, moment, action, foil)
+    if "contrast" in parts and pair[1] is None:
         raise InputError("There is no other action to contrast it with.", "Ask for --what forecast")
     count = (50 if agent.world is None else 300) if episodes is None else episodes
     if "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for --episodes 50.")
-    told = tell(play(agent, seed, max_steps=limit)) if "episode" in wanted else None
-    copied = "calibration" in wanted or "contrast" in wanted
-    copying = agent.copying if copied else None
-    report = None
+    report, trial = None, None
     if count:
+        copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
         report = assess(agent, episodes=count, max_steps=limit, copying=copying, watch=watch)
-    explanation = None
-    if moment is not None and pair is not None:
-        explanation = explain(moment if report is None else judged(moment, report), *pair)
-    trial = None
-    if pair is not None and pair[1] is not None and "contrast" in wanted:
+    if moment is not None and report is not None:
+        moment = judged(moment, report)
+    if "contrast" in wanted and pair[0] is not None and pair[1] is not None:
         trial = try_out(agent, pair[0], pair[1], seed=seed, step=step)
-    return Explained(agent, parts, seed, step, explanation, report, trial, told, limit)
+    return Explained(
+        agent=agent,
+        parts=parts,
+        seed=seed,
+        step=step,
+        explanation=None if moment is None else explain(moment, *pair),
+        report=report,
+        trial=trial,
+        story=tell(play(agent, seed, max_steps=limit)) if "episode" in wanted else None,
+        max_steps=limit,
+    )
+
+
+def _limit(agent: Agent, step: int, max_steps: int | None) -> int:
+    """Returns the steps after which an episode is cut off."""
+    if max_steps is None:
+        return max(usual_limit(agent.estimator.time_axis), step + 1)
+    if step >= max_steps:
+        raise InputError(
+            f"There is no step {step} in {max_steps} steps.", "Choose another --max-steps."
+        )
+    return max_steps
+
+
+def _pair(
+    agent: Agent, moment: Moment, action: str | None, foil: str | None
+) -> tuple[str, str | None]:
+    """Returns the names of the action to explain and of its foil, None where there is none."""
+    names = (None if name is None else agent.action(name) for name in (action, foil))
+    return moment.pair(*names)

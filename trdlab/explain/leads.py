@@ -13,6 +13,7 @@ from trdlab.explain.rhythm import NEGLIGIBLE, SHARE, least, stands_out, undiscou
 NOISE = 0.1
 """A lead of what was learned may be noise up to this share of the largest one."""
 
+_SEEN = 1e-3  # of a sum: a cost that changes it as it is printed
 _SOON = 0.2  # of the explicit steps: what comes within them is immediate
 _MOST_CROSSINGS = 2  # of more only the last is told
 
@@ -221,8 +222,11 @@ def _called(moment: Moment, leader: str, other: str, count: int) -> type[_Lead]:
         return PaysMoreNet
     lead = running_lead(moment, leader, other)[:count]
     axis, begins = moment.time_axis, int((lead >= SHARE * lead[-1]).argmax())
-    is_soon = axis.start(begins) <= max(1.0, _SOON * axis.num_steps)
-    return MoreImmediate if is_soon else PaysMore
+    if axis.start(begins) <= max(1.0, _SOON * axis.num_steps):
+        return MoreImmediate
+    rows = np.stack([moment.components(name)[:count] for name in (leader, other)])
+    is_net = moment.is_exact and bool((rows < -_SEEN * ahead).any())  # else it may be noise
+    return PaysMoreNet if is_net else PaysMore
 
 
 def _notable(moment: Moment, action: str) -> FloatArray:

@@ -2,7 +2,6 @@
 
 import io
 import json
-import re
 from dataclasses import replace
 from functools import cache
 
@@ -12,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
+import mutants
 from trdlab.cli import main
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
@@ -24,7 +24,6 @@ from trdlab.explain.comparison.visits import Visits
 from trdlab.explain.trust.intervals import Estimates
 from trdlab.explain.trust.report import TrustReport
 from trdlab.explain.trust.trusted import trust
-from trdlab.show import UnsupportedSentenceError
 from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page
 from trdlab.show.comparison_data import comparison_to_dict
 from trdlab.show.comparison_plots import comparison_figure
@@ -165,34 +164,18 @@ def real() -> tuple[Comparison, ...]:
 
 def mutations(sentence: str) -> list[str]:
     """Returns the sentence with each number, name and word changed."""
-    result = [
-        re.sub(rf"\b{old}\b", new, sentence, count=1)
-        for old, new in WORDS.items()
-        if re.search(rf"\b{old}\b", sentence)
+    return [
+        *mutants.numbers(sentence),
+        *mutants.words(sentence, WORDS),
+        *mutants.exchanged(sentence, "A", "B"),
+        *mutants.words(sentence, {f"of {name}": "of sideways" for name in NAMES}),
     ]
-    for match in re.finditer(r"\d+(?:\.\d+)?", sentence):
-        text, decimals = match[0], len(match[0].partition(".")[2])
-        for step in (1, -1):
-            digits = int(text.replace(".", "")) + step
-            if digits >= 0:
-                other = f"{digits / 10**decimals:.{decimals}f}"
-                result.append(sentence[: match.start()] + other + sentence[match.end() :])
-    sides = re.compile(r"\b[AB]\b")
-    if sides.search(sentence):
-        result.append(sides.sub(lambda side: "B" if side[0] == "A" else "A", sentence))
-    sideways = [sentence.replace(f"of {name}", "of sideways", 1) for name in NAMES]
-    return result + [mutant for mutant in sideways if mutant != sentence]
 
 
 def survivors(comparison: Comparison) -> list[str]:
-    survived, said = [], comparison_sentences(comparison)
-    for mutant in {mutant for text in said for mutant in mutations(text)} - set(said):
-        try:
-            check_comparison(mutant, comparison)
-        except UnsupportedSentenceError:
-            continue
-        survived.append(mutant)
-    return survived
+    said = comparison_sentences(comparison)
+    found = {mutant for text in said for mutant in mutations(text)} - set(said)
+    return mutants.survivors(found, lambda text: check_comparison(text, comparison))
 
 
 def supported(comparison: Comparison) -> None:

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import mutants
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explain.contrast import in_short
@@ -223,22 +224,6 @@ def test_every_kind_of_finding_occurs_and_has_a_sentence(
     assert seen == set(TEMPLATES), f"never found: {set(TEMPLATES) - seen}"
 
 
-def mutated_numbers(sentence: str) -> list[str]:
-    """Returns the sentence with each of its numbers changed in its last digit, up and down."""
-    result = []
-    for match in re.finditer(r"\d+(?:\.\d+)?", sentence):
-        text = match[0]
-        for step in (1, -1):
-            digits = int(text.replace(".", "")) + step
-            if digits < 0:
-                continue
-            decimals = len(text.partition(".")[2])
-            other = f"{digits / 10**decimals:.{decimals}f}"
-            if other != text:
-                result.append(sentence[: match.start()] + other + sentence[match.end() :])
-    return result
-
-
 def mutated_names(sentence: str, names: tuple[str, ...]) -> list[str]:
     """Returns the sentence with the actions exchanged, and with one that does not exist."""
     a, b = names[:2]
@@ -248,18 +233,8 @@ def mutated_names(sentence: str, names: tuple[str, ...]) -> list[str]:
     result = [pattern.sub("sideways", sentence, count=1)]
     both = {name.lower() for name in pattern.findall(sentence)} == {a, b}
     if both and not any(words in sentence for words in SYMMETRIC):
-        other = {a: b, b: a}
-        swapped = pattern.sub(lambda m: other[m[0].lower()], sentence)
-        result.append(swapped[0].upper() + swapped[1:])
+        result += mutants.exchanged(sentence, a, b)
     return result
-
-
-def mutated_words(sentence: str) -> list[str]:
-    return [
-        re.sub(rf"(?<!\w){old}\b", new, sentence, count=1)
-        for old, new in WORDS.items()
-        if re.search(rf"(?<!\w){old}\b", sentence)
-    ]
 
 
 def mutations(explanation: Explanation) -> list[str]:
@@ -267,19 +242,16 @@ def mutations(explanation: Explanation) -> list[str]:
     return [
         mutant
         for text in sentences(explanation)
-        for mutant in [*mutated_numbers(text), *mutated_names(text, names), *mutated_words(text)]
+        for mutant in [
+            *mutants.numbers(text),
+            *mutated_names(text, names),
+            *mutants.words(text, WORDS),
+        ]
     ]
 
 
 def survivors(explanation: Explanation) -> list[str]:
-    survived = []
-    for mutant in mutations(explanation):
-        try:
-            check(mutant, explanation)
-        except UnsupportedSentenceError:
-            continue
-        survived.append(mutant)
-    return survived
+    return mutants.survivors(mutations(explanation), lambda text: check(text, explanation))
 
 
 def test_a_mutated_number_name_or_claim_about_a_map_fails(of_maps: list[Explanation]):

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import mutants
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Episode, collect
@@ -129,18 +130,11 @@ def episodes(draw: st.DrawFn) -> Played:
 
 def mutations(sentence: str, names: tuple[str, ...] = NAMES) -> list[str]:
     """Returns the sentence with each number changed in its last digit, other words and names."""
-    result = [sentence.replace(old, new, 1) for old, new in WORDS.items() if old in sentence]
+    result = [*mutants.numbers(sentence), *mutants.words(sentence, WORDS)]
     named = re.match(rf"(With )?({'|'.join(names)})\b", sentence, re.IGNORECASE)
     if named:
         others = [name for name in ("sideways", *names) if name.lower() != named[2].lower()]
         result += [sentence.replace(named[2], name, 1) for name in others]
-    for match in re.finditer(r"\d+(?:\.\d+)?", sentence):
-        text, decimals = match[0], len(match[0].partition(".")[2])
-        for step in (1, -1):
-            digits = int(text.replace(".", "")) + step
-            if digits >= 0:
-                other = f"{digits / 10**decimals:.{decimals}f}"
-                result.append(sentence[: match.start()] + other + sentence[match.end() :])
     return result
 
 
@@ -152,16 +146,11 @@ def true_elsewhere(played: Played) -> set[str]:
 
 
 def survivors(played: Played) -> list[str]:
-    survived, true = [], true_elsewhere(played)
-    for sentence in story_sentences(tell(played)):
-        for mutant in mutations(sentence, played.action_names):
-            try:
-                check_story(mutant, played)
-            except UnsupportedSentenceError:
-                continue
-            if mutant not in true:
-                survived.append(mutant)
-    return survived
+    said = story_sentences(tell(played))
+    found = (mutant for text in said for mutant in mutations(text, played.action_names))
+    true = true_elsewhere(played)
+    survived = mutants.survivors(found, lambda text: check_story(text, played))
+    return [mutant for mutant in survived if mutant not in true]
 
 
 def test_every_sentence_about_a_real_episode_is_supported_and_no_mutation_is():

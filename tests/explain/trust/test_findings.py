@@ -1,6 +1,5 @@
 """What is said of a forecast is read back and tested, over reports real and random."""
 
-import re
 from dataclasses import replace
 from functools import cache
 
@@ -10,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
+import mutants
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
@@ -171,30 +171,12 @@ def reports(draw: st.DrawFn) -> TrustReport:
 
 def mutations(sentence: str) -> list[str]:
     """Returns the sentence with each number changed in its last digit, and with other words."""
-    result = [
-        re.sub(rf"\b{old}\b", new, sentence, count=1)
-        for old, new in WORDS.items()
-        if re.search(rf"\b{old}\b", sentence)
-    ]
-    for match in re.finditer(r"\d+(?:\.\d+)?", sentence):
-        text, decimals = match[0], len(match[0].partition(".")[2])
-        for step in (1, -1):
-            digits = int(text.replace(".", "")) + step
-            if digits >= 0:
-                other = f"{digits / 10**decimals:.{decimals}f}"
-                result.append(sentence[: match.start()] + other + sentence[match.end() :])
-    return result
+    return [*mutants.numbers(sentence), *mutants.words(sentence, WORDS)]
 
 
 def survivors(report: TrustReport) -> list[str]:
-    survived = []
-    for mutant in (m for sentence in trust_sentences(report) for m in mutations(sentence)):
-        try:
-            check_trust(mutant, report)
-        except UnsupportedSentenceError:
-            continue
-        survived.append(mutant)
-    return survived
+    found = (mutant for text in trust_sentences(report) for mutant in mutations(text))
+    return mutants.survivors(found, lambda text: check_trust(text, report))
 
 
 def test_every_sentence_about_an_exact_table_is_supported_and_no_mutation_is():

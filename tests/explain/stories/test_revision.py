@@ -1,41 +1,18 @@
 """What each step changes in what was expected: by hand, and against exact tables."""
 
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 import pytest
 
-from trdlab.decomposition import RewardDecomposition, TimeAxis
+from by_hand import episode
+from trdlab.decomposition import TimeAxis
 from trdlab.explain.copies import ModelEnvironments
-from trdlab.explain.episodes import Episode, collect
+from trdlab.explain.episodes import collect
 from trdlab.explain.stories.played import Played
 from trdlab.explain.stories.revision import revise
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import exact
 
-
-def episode(
-    expected: list[list[float]], rewards: list[float], axis: TimeAxis, **changes: Any
-) -> Episode:
-    """An episode of one action, by what was expected at every observation."""
-    total, components = len(rewards), np.array(expected)
-    ends = np.zeros(total, dtype=np.bool_)
-    ends[-1] = changes.setdefault("terminated", True)
-    known = Episode(
-        decomposition=RewardDecomposition(components[:total, None], axis),
-        expected=components,
-        actions=np.zeros(total, dtype=np.int64),
-        rewards=np.array(rewards),
-        life_lost=np.zeros(total, dtype=np.bool_),
-        ends=ends,
-        terminated=True,
-        random=np.zeros(total + axis.num_steps, dtype=np.bool_),
-    )
-    return replace(known, **changes)
-
-
-SHORT = ([[0.0, 1.0, 2.0], [2.0, 1.0, 0.0], [4.0, 2.0, 2.0]], [1.0, 2.0], TimeAxis(0.5, 2))
+SHORT = ([1.0, 2.0], TimeAxis(0.5, 2), [[0.0, 1.0, 2.0], [2.0, 1.0, 0.0], [4.0, 2.0, 2.0]])
 
 
 def test_the_next_forecast_one_step_later_less_the_last_one():
@@ -52,7 +29,7 @@ def test_where_an_episode_was_cut_off_its_last_observation_counts():
     assert not found.ended.any()
 
 
-GROUPED = ([[1.0, 1.0], [1.0, 0.0], [4.0, 1.0], [9.0, 9.0]], [1.0, 2.0, 4.0], TimeAxis(0.5, 1, 2))
+GROUPED = ([1.0, 2.0, 4.0], TimeAxis(0.5, 1, 2), [[1.0, 1.0], [1.0, 0.0], [4.0, 1.0], [9.0, 9.0]])
 
 
 def test_a_window_is_shortened_by_an_end_but_not_by_a_truncation():
@@ -78,13 +55,13 @@ def test_a_window_with_a_random_action_after_the_first_is_left_out():
 
 def test_without_explicit_components_it_is_the_td_error():
     axis = TimeAxis(0.5, 0)
-    found = revise(episode([[3.0], [2.0], [9.0]], [1.0, 2.0], axis))
+    found = revise(episode([1.0, 2.0], axis, [[3.0], [2.0], [9.0]]))
     assert found.change.tolist() == [[-1.0], [0.0]]
 
 
 def test_an_episode_shorter_than_a_group_has_no_revision():
     axis = TimeAxis(0.5, 1, 5)
-    cut = episode([[1.0, 1.0], [1.0, 1.0]], [1.0], axis, terminated=False)
+    cut = episode([1.0], axis, [[1.0, 1.0], [1.0, 1.0]], terminated=False)
     assert len(revise(cut)) == 0
     assert Played(cut, ("wait",)).row(0) is None
 

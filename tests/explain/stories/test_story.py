@@ -1,16 +1,17 @@
 """What is told of an episode: key moments, rewards foreseen, promises broken."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
+from by_hand import episode
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explain.copies import ModelEnvironments
-from trdlab.explain.episodes import Episode, collect
+from trdlab.explain.episodes import collect
 from trdlab.explain.stories.played import Played
 from trdlab.explain.stories.promises import (
     BrokenPromise,
@@ -38,20 +39,7 @@ AXIS = TimeAxis(0.5, 4)
 
 def played(expected: Any, rewards: list[float], axis: TimeAxis = AXIS, **changes: Any) -> Played:
     """An episode of one action, by what was expected at every observation."""
-    total, components = len(rewards), np.array(expected)
-    ends = np.zeros(total, dtype=np.bool_)
-    ends[-1] = changes.setdefault("terminated", True)
-    episode = Episode(
-        decomposition=RewardDecomposition(components[:total, None], axis),
-        expected=components,
-        actions=np.zeros(total, dtype=np.int64),
-        rewards=np.array(rewards),
-        life_lost=np.zeros(total, dtype=np.bool_),
-        ends=ends,
-        terminated=True,
-        random=np.zeros(total + axis.num_steps, dtype=np.bool_),
-    )
-    return Played(replace(episode, **changes), ("wait",))
+    return Played(episode(rewards, axis, expected, **changes), ("wait",))
 
 
 def foretold(rewards: list[float], axis: TimeAxis = AXIS) -> FloatArray:

@@ -1,7 +1,6 @@
 """Calibration: estimators whose errors are known, in a world that is known."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -9,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from by_hand import Given, episode, occupancy
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Step
@@ -25,18 +25,6 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import ExactTable, exact
 
 AXIS = TimeAxis(0.95, 20)
-
-
-@dataclass(frozen=True, eq=False)
-class Given:
-    """A table `[S, A, N+1]` of whatever components, as an Estimator."""
-
-    components: FloatArray
-    time_axis: TimeAxis
-    future = Future("the given policy")
-
-    def decompose(self, observations: Any) -> RewardDecomposition:
-        return RewardDecomposition(self.components[observations], self.time_axis)
 
 
 @cache
@@ -59,7 +47,7 @@ def played(
     components[..., :-1] = change(components[..., :-1] / axis.discounts[:-1]) * axis.discounts[:-1]
     environments = ModelEnvironments(table.mdp, num, seed=seed, time_limit=time_limit)
     return collect(
-        Given(components, axis),
+        Given(components, axis, Future("the given policy")),
         environments,
         policy=lambda states: table.solution.policy[states],
         epsilon=epsilon,
@@ -85,23 +73,6 @@ def smeared(rewards: FloatArray) -> FloatArray:
 
 
 # ---- what followed -------------------------------------------------------------------------------
-
-
-def episode(rewards: list[float], axis: TimeAxis, **changes: Any) -> Episode:
-    total = len(rewards)
-    ends = np.zeros(total, dtype=np.bool_)
-    ends[-1] = changes.setdefault("terminated", True)
-    default = Episode(
-        decomposition=RewardDecomposition(np.zeros((total, 2, axis.num_components)), axis),
-        expected=np.zeros((total + 1, axis.num_components)),
-        actions=np.zeros(total, dtype=np.int64),
-        rewards=np.array(rewards),
-        life_lost=np.zeros(total, dtype=np.bool_),
-        ends=ends,
-        terminated=True,
-        random=np.zeros(total + axis.num_steps, dtype=np.bool_),
-    )
-    return replace(default, **changes)
 
 
 def test_what_followed_is_the_discounted_reward_of_each_step_and_zero_after_the_end():
@@ -396,14 +367,3 @@ def test_the_horizon_that_suffices_is_read_off_the_rewards():
     least = sufficient_horizon(tails)
     assert least is not None
     assert found.sufficient() in (least - 1, least, least + 1)
-
-
-def occupancy(table: ExactTable) -> FloatArray:
-    """Returns `[S, A]`: how often an episode takes each action in each state."""
-    mdp, policy = table.mdp, table.solution.policy
-    follow = policy[mdp.transition_states, mdp.transition_actions] * mdp.continuation
-    chain = np.zeros((mdp.num_states, mdp.num_states))
-    np.add.at(chain, (mdp.next_states, mdp.transition_states), follow)
-    begin = np.eye(mdp.num_states)[mdp.start]
-    states: FloatArray = np.linalg.solve(np.eye(mdp.num_states) - chain, begin)
-    return states[:, None] * policy

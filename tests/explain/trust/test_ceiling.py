@@ -7,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from by_hand import occupancy
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments.stack import FrameStack
@@ -30,17 +31,6 @@ DRONE = Gridworld(load_map("drone").with_slip(0.2))
 @cache
 def bridge() -> ExactTable:
     return exact(Gridworld(load_map("bridge")).mdp, AXIS)
-
-
-def occupancy(table: ExactTable) -> FloatArray:
-    """Returns `[S, A]`: how often an episode takes each action in each state."""
-    mdp, policy = table.mdp, table.solution.policy
-    follow = policy[mdp.transition_states, mdp.transition_actions] * mdp.continuation
-    chain = np.zeros((mdp.num_states, mdp.num_states))
-    np.add.at(chain, (mdp.next_states, mdp.transition_states), follow)
-    begin = np.eye(mdp.num_states)[mdp.start]
-    states: FloatArray = np.linalg.solve(np.eye(mdp.num_states) - chain, begin)
-    return states[:, None] * policy
 
 
 def inside(found: Estimates, true: FloatArray) -> float:

@@ -1,15 +1,16 @@
 """Planted faults are named, each by its name; healthy estimators raise none."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
+from by_hand import Given, episode
 from trdlab.arrays import FloatArray
 from trdlab.bellman import target
-from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explain.copies import ModelEnvironments
@@ -29,19 +30,8 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import MDP, exact, learn
 
 SINGLE, PAIRS = TimeAxis(0.95, 12), TimeAxis(0.95, 6, 2)
+GREEDY = Future("the greedy policy")
 WORLDS = ("drone", "windy")
-
-
-@dataclass(frozen=True, eq=False)
-class Given:
-    """A table `[S, A, N+1]` of whatever components, as an Estimator."""
-
-    components: FloatArray
-    time_axis: TimeAxis
-    future = Future("the greedy policy")
-
-    def decompose(self, observations: Any) -> RewardDecomposition:
-        return RewardDecomposition(self.components[observations], self.time_axis)
 
 
 @cache
@@ -52,7 +42,7 @@ def world(name: str) -> MDP:
 def played(name: str, components: FloatArray, axis: TimeAxis, seed: int, num: int = 200) -> Any:
     """Plays the greedy policy of some components, whatever is wrong with them."""
     environments = ModelEnvironments(world(name), num, seed=seed, time_limit=200)
-    return collect(Given(components, axis), environments, seed=seed)
+    return collect(Given(components, axis, GREEDY), environments, seed=seed)
 
 
 def diagnosed(episodes: tuple[Episode, ...]) -> tuple[Fault, ...]:
@@ -118,7 +108,7 @@ def test_an_estimator_that_has_learned_raises_no_alarm(seed: int):
 def test_a_reward_shifted_by_one_step_is_named(name: str, seed: int):
     policy, components = early(world(name))
     episodes = collect(
-        Given(components, SINGLE),
+        Given(components, SINGLE, GREEDY),
         ModelEnvironments(world(name), 200, seed=seed, time_limit=100),
         policy=lambda states: policy[states],
         seed=seed,
@@ -167,28 +157,14 @@ def test_what_is_expected_after_the_end_itself_is_seen():
 # ---- the audit -----------------------------------------------------------------------------------
 
 
-def episode(predicted: list[list[float]], axis: TimeAxis, **changes: Any) -> Episode:
-    total = len(predicted) - 1
-    ends = np.zeros(total, dtype=np.bool_)
-    ends[-1] = True
-    return replace(
-        Episode(
-            decomposition=RewardDecomposition(np.array(predicted[:-1])[:, None], axis),
-            expected=np.array(predicted),
-            actions=np.zeros(total, dtype=np.int64),
-            rewards=np.zeros(total),
-            life_lost=np.zeros(total, dtype=np.bool_),
-            ends=ends,
-            terminated=True,
-            random=np.zeros(total + axis.num_steps, dtype=np.bool_),
-        ),
-        **changes,
-    )
+def predicted(rows: list[list[float]], axis: TimeAxis, **changes: Any) -> Episode:
+    """An episode without a reward, by what was expected at every observation."""
+    return episode([0.0] * (len(rows) - 1), axis, rows, **changes)
 
 
 def test_the_gap_between_steps_by_hand():
     axis = TimeAxis(0.5, 2)
-    found = audit([episode([[1.0, 2.0, 3.0], [4.0, 1.0, 1.0], [9.0, 9.0, 9.0]], axis)])
+    found = audit([predicted([[1.0, 2.0, 3.0], [4.0, 1.0, 1.0], [9.0, 9.0, 9.0]], axis)])
     assert (found.num_transitions, found.num_ends) == (2, 1)
     # step 0: 2 − ½·4 and 3 − ½·(1 + 1); step 1 ended, so 1 and 1 should be nothing
     assert found.gap.value.tolist() == [0.5, 1.5]
@@ -198,17 +174,17 @@ def test_pairs_leave_out_what_random_actions_and_truncations_hide():
     axis = TimeAxis(0.5, 1, 2)
     rows = [[1.0, 1.0]] * 7  # six steps and the last observation
     cut = {"terminated": False, "ends": np.zeros(6, dtype=np.bool_)}
-    assert audit([episode(rows, axis)]).num_transitions == 6
-    assert audit([episode(rows, axis, **cut)]).num_transitions == 5  # one reaches beyond
-    assert audit([episode(rows, axis, **cut)]).num_ends == 0
+    assert audit([predicted(rows, axis)]).num_transitions == 6
+    assert audit([predicted(rows, axis, **cut)]).num_transitions == 5  # one reaches beyond
+    assert audit([predicted(rows, axis, **cut)]).num_ends == 0
     random = np.array([False, False, True, False, False, False, False, False])
-    assert audit([episode(rows, axis, random=random)]).num_transitions == 5
-    assert audit([episode(rows, axis, time_limit=6)]).num_transitions == 5
+    assert audit([predicted(rows, axis, random=random)]).num_transitions == 5
+    assert audit([predicted(rows, axis, time_limit=6)]).num_transitions == 5
     with pytest.raises(InputError, match="0 pairs of steps"):
-        audit([episode(rows[:2], axis, terminated=False, ends=np.zeros(1, dtype=np.bool_))])
+        audit([predicted(rows[:2], axis, terminated=False, ends=np.zeros(1, dtype=np.bool_))])
 
 
 def test_an_audit_that_says_nothing_names_nothing():
-    silent: Audit = audit([episode([[0.0, 0.0]] * 4, TimeAxis(0.5, 1))] * 12)
+    silent: Audit = audit([predicted([[0.0, 0.0]] * 4, TimeAxis(0.5, 1))] * 12)
     assert np.isnan(discount_exponent(silent).value)
     assert diagnose(None, silent) == ()

@@ -3,57 +3,11 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-import torch
 
-from trdlab.cli import main
-from trdlab.deep.settings import TrainSettings
-from trdlab.training.run import begin, carry_on
-
-Outcome = tuple[int, str, str]
-Trdlab = Callable[..., Outcome]
 TABLES = ("gridworld:ledge", "gridworld:ledge,slip=0.3")
-
-
-@pytest.fixture
-def trdlab(capsys, monkeypatch, tmp_path) -> Trdlab:
-    """Returns a function that runs `trdlab`: exit code, stdout, stderr."""
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words: object) -> Outcome:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            main([*map(str, words)])
-        out, err = capsys.readouterr()
-        return int(end.value.code or 0), out, err
-
-    return run
-
-
-@pytest.fixture(scope="module")
-def trained(tmp_path_factory) -> Path:
-    """Returns a run with two checkpoints; not to be changed."""
-    out = tmp_path_factory.mktemp("runs") / "drone"
-    lines: dict[str, Any] = {
-        "agent_steps": 1000,
-        "learning_starts": 100,
-        "checkpoint_every": 500,
-        "gamma": 0.9,
-        "N": 6,
-        "hidden": [16],
-        "env_arg": ["slip=0.2"],
-    }
-    threads = torch.get_num_threads()
-    settings = TrainSettings("gym", "trdlab/DroneGridworld-v0").changed(lines)
-    with begin(settings, out) as run:
-        carry_on(run)
-    torch.set_num_threads(threads)
-    return out
 
 
 def test_two_tables_are_compared_and_a_picture_is_drawn(trdlab, tmp_path):

@@ -1,40 +1,32 @@
 """Agents by their names: exact tables of any model, runs and their checkpoints."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
+from small_runs import train
 from trdlab.decomposition import TimeAxis
-from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError
 from trdlab.explain import find_agent, gridworld_agent
 from trdlab.explain.agents import tabular_agent
 from trdlab.explain.copies import ModelEnvironments
-from trdlab.training.run import begin, carry_on
 
 AXIS = TimeAxis(0.95, 4)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def trained(tmp_path_factory) -> Path:
     """Returns a run with two checkpoints; not to be changed."""
-    out = tmp_path_factory.mktemp("runs") / "lake"
-    lines: dict[str, Any] = {
-        "agent_steps": 600,
-        "learning_starts": 100,
-        "checkpoint_every": 200,
-        "N": 4,
-        "hidden": [8],
-        "env_arg": ["is_slippery=false"],
-    }
-    threads = torch.get_num_threads()
-    with begin(TrainSettings("gym", "FrozenLake-v1").changed(lines), out) as run:
-        carry_on(run)
-    torch.set_num_threads(threads)
-    return out
+    return train(
+        tmp_path_factory.mktemp("runs") / "lake",
+        "FrozenLake-v1",
+        agent_steps=600,
+        checkpoint_every=200,
+        N=4,
+        hidden=[8],
+        env_arg=["is_slippery=false"],
+    )
 
 
 def test_moments_are_steps_of_the_agents_own_episodes():

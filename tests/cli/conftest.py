@@ -1,0 +1,45 @@
+"""What the tests of several commands share."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from trdlab.cli import main
+
+Outcome = tuple[int, str, str]
+Trdlab = Callable[..., Outcome]
+
+
+@pytest.fixture
+def trdlab(capsys, monkeypatch, tmp_path) -> Trdlab:
+    """Returns a function that runs `trdlab` in an empty folder: exit code, stdout, stderr."""
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: object) -> Outcome:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main([*map(str, words)])
+        out, err = capsys.readouterr()
+        return int(end.value.code or 0), out, err
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def trained(tmp_path_factory) -> Path:
+    """Returns a run with two checkpoints; not to be changed."""
+    from small_runs import train  # with PyTorch, which most of these tests do without
+
+    return train(
+        tmp_path_factory.mktemp("runs") / "drone",
+        "trdlab/DroneGridworld-v0",
+        agent_steps=1000,
+        checkpoint_every=500,
+        gamma=0.9,
+        N=6,
+        hidden=[16],
+        clip_rewards=True,
+        env_arg=["slip=0.2"],
+    )

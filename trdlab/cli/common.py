@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -38,6 +38,10 @@ AGENT = (
     "A run's folder, or RUN@STEP for an older checkpoint; or an exact table: gridworld:NAME, a map "
     "file, or tabular:ENV_ID, with arguments after commas, such as gridworld:ledge,slip=0.2."
 )
+EnvArguments = Annotated[
+    list[str] | None,
+    typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
+]
 MaxSteps = Annotated[
     int | None,
     typer.Option(
@@ -49,6 +53,12 @@ MaxSteps = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Show tracebacks.")]
+
+
+def pictures_option(drawn: str) -> Any:
+    """Returns the option of a folder to draw into; `drawn` says when there is one by default."""
+    default = f"{drawn} a new folder in explanations"
+    return typer.Option("--out", metavar="DIR", help="Write pictures there.", show_default=default)
 
 
 def new_console() -> tuple[Console, bool]:

@@ -16,10 +16,7 @@ def compare(
         str | None,
         typer.Option("--env", help="Where both act.", show_default="where A was made for"),
     ] = None,
-    env_arguments: Annotated[
-        list[str] | None,
-        typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
-    ] = None,
+    env_arguments: common.EnvArguments = None,
     gamma: Annotated[
         float | None,
         typer.Option(
@@ -50,15 +47,7 @@ def compare(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first episode.")] = 0,
     max_steps: common.MaxSteps = None,
     as_json: common.AsJson = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="Write a picture there.",
-            show_default="without --json a new folder in explanations",
-        ),
-    ] = None,
+    out: Annotated[Path | None, common.pictures_option("without --json")] = None,
     verbose: common.Verbose = False,
 ) -> None:
     """Compare what two agents expect at the same states, when, and how far each can be trusted.

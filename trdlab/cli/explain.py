@@ -44,10 +44,7 @@ def explain(
         str | None,
         typer.Option("--env", help="Where it acts.", show_default="where it was made for"),
     ] = None,
-    env_arguments: Annotated[
-        list[str] | None,
-        typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
-    ] = None,
+    env_arguments: common.EnvArguments = None,
     gamma: Annotated[
         float | None,
         typer.Option("--gamma", help="Of an exact table: discount factor.", show_default="0.95"),
@@ -71,15 +68,7 @@ def explain(
     ] = None,
     max_steps: common.MaxSteps = None,
     as_json: common.AsJson = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="Write pictures there.",
-            show_default="without --what and --json a new folder in explanations",
-        ),
-    ] = None,
+    out: Annotated[Path | None, common.pictures_option("without --what and --json")] = None,
     verbose: common.Verbose = False,
 ) -> None:
     """Say what an agent expects, when, and how far that can be trusted.

@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.padding import Padding
 from rich.table import Table
-from rich.text import Text
 
 from trdlab.arrays import FloatArray
 from trdlab.explain.comparison import background, differences
@@ -19,7 +17,7 @@ from trdlab.explain.comparison.report import SIDES, Comparison
 from trdlab.explain.finding import Claim
 from trdlab.formatting import decimals_for, number
 from trdlab.show.templates import Form, Language, forms_of
-from trdlab.show.text import fit, vector
+from trdlab.show.text import fit, paragraph, vector
 from trdlab.statistics import Estimate
 from trdlab.time_axis import axis_title
 
@@ -163,8 +161,7 @@ def page(comparison: Comparison, *, ascii_only: bool = False) -> RenderableType:
     lines: list[RenderableType] = []
 
     def add(text: str, style: str = "", indent: int = 0) -> None:
-        line = Text(fit(text, ascii_only=ascii_only), style=style)
-        lines.append(Padding(line, (0, 0, 0, indent)))
+        lines.append(paragraph(text, style, indent, ascii_only=ascii_only))
 
     def tell(findings: Sequence[ComparisonFinding]) -> None:
         for finding in findings:

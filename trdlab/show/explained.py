@@ -5,8 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from rich.console import Group, RenderableType
-from rich.padding import Padding
-from rich.text import Text
 
 from trdlab.explain.contrast import in_short
 from trdlab.explain.explained import FIELDS, PARTS, Explained
@@ -19,7 +17,7 @@ from trdlab.show.report import actions_to_dict
 from trdlab.show.sentences import MOMENTS, sentence
 from trdlab.show.story import STORIES, story_lines, story_sentence, story_to_dict
 from trdlab.show.templates import Language, checked, split
-from trdlab.show.text import action_table, fit, story
+from trdlab.show.text import action_table, paragraph, story
 from trdlab.show.trials import TRIALS, trial_sentence, trial_sentences
 from trdlab.show.trust_data import plain_data, trust_to_dict
 from trdlab.show.verdicts import REPORTS, trust_sentence
@@ -50,8 +48,7 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
     lines: list[RenderableType] = []
 
     def add(text: str, style: str = "", indent: int = 0) -> None:
-        line = Text(fit(text, ascii_only=ascii_only), style=style)
-        lines.append(Padding(line, (0, 0, 0, indent)))
+        lines.append(paragraph(text, style, indent, ascii_only=ascii_only))
 
     add(_heading(explained), "bold")
     add(_setting(explained), "dim")

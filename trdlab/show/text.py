@@ -30,6 +30,11 @@ def fit(text: str, *, ascii_only: bool) -> str:
     return text.translate(_ASCII).encode("ascii", "replace").decode() if ascii_only else text
 
 
+def paragraph(text: str, style: str = "", indent: int = 0, *, ascii_only: bool) -> RenderableType:
+    """Returns a text of which every line is indented."""
+    return Padding(Text(fit(text, ascii_only=ascii_only), style=style), (0, 0, 0, indent))
+
+
 def action_table(
     moment: Moment, action: str, foil: str | None = None, *, ascii_only: bool = False
 ) -> Table:
@@ -90,8 +95,8 @@ def story(
         title = heading.format(action=explanation.action, foil=explanation.foil)
         parts.append(Text(title[0].upper() + title[1:], style="bold"))
         for finding in findings:
-            text = Text(fit(sentence(finding, explanation), ascii_only=ascii_only))
-            parts.append(Padding(text, (0, 0, 0, 2)))
+            text = sentence(finding, explanation)
+            parts.append(paragraph(text, indent=2, ascii_only=ascii_only))
     return Group(*parts)
 
 

@@ -10,10 +10,15 @@ import pytest
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import Moment, explain, explain_agent, gridworld_agent
+from trdlab.explain import Moment, assess, explain, explain_agent, gridworld_agent
 from trdlab.explain.explained import Explained, Part, parse_parts
 from trdlab.show.explained import check_explained, summary, to_dict
-from trdlab.show.explained_plots import moment_figure, part_figure, picture_paths
+from trdlab.show.explained_plots import (
+    moment_figure,
+    part_figure,
+    picture_paths,
+    trust_figure,
+)
 from trdlab.show.sentences import UnsupportedSentenceError
 
 
@@ -114,6 +119,22 @@ def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
     assert notes[1][-1] == "↑ 2"
     assert notes[2][-1] == "↑ 92.5"
     assert contrast.get_ylim()[1] < 3.0
+
+
+def test_how_often_a_reward_came_is_drawn_where_there_is_one_amount():
+    several = explained("ledge").report  # -1 and 1
+    assert several is not None
+    assert len(trust_figure(several, "ledge").axes) == 1
+    coin = assess(gridworld_agent("loop,slip=0.2", TimeAxis(0.95, 4)), episodes=40)
+    skill, chance = trust_figure(coin, "loop").axes
+    assert skill.get_ylabel().startswith("skill")
+    assert chance.get_title() == "chance of the reward of 1"
+    drawn = np.asarray(chance.collections[-1].get_offsets())
+    found = coin.calibration.reliability
+    assert found is not None
+    first = found.counts[:, 0]
+    assert drawn[0, 0] == pytest.approx(np.nansum(found.predicted[:, 0] * first) / first.sum())
+    assert np.abs(drawn[:, 0] - drawn[:, 1]).max() < 0.1, "an exact table is near the diagonal"
 
 
 def test_there_is_a_picture_only_of_what_there_is():

@@ -25,7 +25,7 @@ from trdlab.show.plots import (
 )
 from trdlab.show.steps_axis import cut_off, positions, room_for, share_scale
 from trdlab.show.story_plots import story_figure
-from trdlab.show.trust import plot_trust
+from trdlab.show.trust import plot_reliability, plot_trust
 from trdlab.time_axis import axis_title
 
 _COLOURS = ("#1f4e8c", "#e39a2d")  # dark for the action, light for its foil
@@ -33,6 +33,7 @@ _MUTED = "#5b6470"
 _FADED = 0.25
 _WIDTH = 8.0
 _PANEL = 2.2
+_RELIABILITY = 3.2
 _FOOT = 0.5  # inches
 
 
@@ -192,10 +193,20 @@ def plot_trial(ax: Axes, trial: Trial) -> Axes:
 
 
 def trust_figure(report: TrustReport, title: str) -> Figure:
-    """Returns the skill of every component, and how far a forecast can be trusted."""
-    figure = Figure(figsize=(_WIDTH, 4.0), layout="constrained")
+    """Returns the skill of every component, and how far a forecast can be trusted.
+
+    Where rewards are either 0 or one amount, how often it came stands beside it.
+    """
+    found = report.calibration.reliability
+    figure = Figure(figsize=(_WIDTH + _RELIABILITY * (found is not None), 4.0))
+    figure.set_layout_engine("constrained")
     figure.suptitle(f"{title}: how far its forecasts can be trusted", fontsize=11)
-    plot_trust(figure.subplots(), report)
+    if found is None:
+        plot_trust(figure.subplots(), report)
+        return figure
+    left, right = figure.subplots(1, 2, width_ratios=(_WIDTH, _RELIABILITY))
+    plot_trust(left, report)
+    plot_reliability(right, found)
     return figure
 
 

@@ -6,7 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from trdlab.arrays import FloatArray
+from trdlab.explain.trust.reliability import Reliability
 from trdlab.explain.trust.report import TrustReport
+from trdlab.formatting import amount
 from trdlab.show.steps_axis import STEPS, label_steps, positions
 from trdlab.time_axis import axis_title, step_label
 
@@ -50,6 +52,39 @@ def plot_trust(ax: Axes, report: TrustReport) -> Axes:
     _mark(ax, x[constant], "o", "nothing to predict")
     _mark(ax, x[~constant & ~found.is_("judged")], "x", "not known, or too few episodes")
     _dress(ax, report, x)
+    return ax
+
+
+def plot_reliability(ax: Axes, found: Reliability) -> Axes:
+    """Draws how often a reward came, by the chance that was forecast; on the diagonal all is well.
+
+    Large dots are all steps together, their area by the number of forecasts; small ones are single
+    steps.
+
+    Args:
+        ax: the axes to draw on.
+        found: what came, for rewards that are either 0 or one amount.
+
+    Returns:
+        `ax`.
+    """
+    ax.plot([0.0, 1.0], [0.0, 1.0], color=_MUTED, linewidth=0.8, linestyle=":")
+    ax.scatter(found.predicted, found.observed, s=6, color=_MUTED, alpha=0.5, linewidth=0)
+    count = found.counts.sum(axis=0)  # [bins]
+    seen = count > 0
+    chance, share = (
+        np.nansum(of * found.counts, axis=0)[seen] / count[seen]
+        for of in (found.predicted, found.observed)
+    )
+    ax.plot(chance, share, color=_SKILL, linewidth=1.0)
+    ax.scatter(chance, share, s=20.0 + 160.0 * count[seen] / count.max(), color=_SKILL, alpha=0.7)
+    ax.set(xlim=(-0.05, 1.05), ylim=(-0.05, 1.05), xticks=(0.0, 0.5, 1.0), yticks=(0.0, 0.5, 1.0))
+    ax.set_aspect("equal")
+    ax.set_xlabel("forecast", fontsize=9, color=_MUTED)
+    ax.set_ylabel("came", fontsize=9, color=_MUTED)
+    ax.set_title(f"chance of the reward of {amount(found.amount)}", fontsize=9, color=_MUTED)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.tick_params(labelsize=8)
     return ax
 
 

@@ -2,14 +2,16 @@
 
 import json
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from trdlab.explain.playing import Playing
 
 
 @pytest.fixture
@@ -194,11 +196,18 @@ def test_a_moment_as_json_tells_its_errors_and_its_only_reward(explain, trained)
     assert json.loads(out)["moment"]["error"] is None
 
 
-def test_what_is_interrupted_leaves_nothing(tmp_path):
-    words = [sys.executable, "-m", "trdlab", "explain", "gridworld:ledge,slip=0.2"]
-    with subprocess.Popen([*words, "--episodes", "1000000"], cwd=tmp_path) as process:
-        with pytest.raises(subprocess.TimeoutExpired):
-            process.wait(timeout=2.0)
-        process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=60.0) == 130
+def test_what_is_interrupted_leaves_nothing(explain, tmp_path, monkeypatch):
+    taken = 0
+
+    def take(self: Playing, *arguments: Any) -> Any:
+        nonlocal taken
+        taken += 1
+        if taken == 20:
+            raise KeyboardInterrupt
+        return original(self, *arguments)
+
+    original = Playing.take
+    monkeypatch.setattr(Playing, "take", take)
+    code, _, err = explain("gridworld:ledge,slip=0.2")
+    assert (code, err) == (130, "error: Interrupted.\n")
     assert list(tmp_path.iterdir()) == []

@@ -57,11 +57,12 @@ class Command:
     """
 
     source = """
-import json, os, sys
+import json, os, signal, sys
 import torch._dynamo, trdlab.cli.app, trdlab.gridworld.render, trdlab.training.loading
 from trdlab.cli import main
 
 os.fsync = lambda number: None  # what a killed process has written is not lost
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where a suite is in the background
 
 for line in sys.stdin:
     words, error = json.loads(line)

@@ -62,7 +62,7 @@ import torch._dynamo, trdlab.cli.app, trdlab.gridworld.render, trdlab.training.l
 from trdlab.cli import main
 
 os.fsync = lambda number: None  # what a killed process has written is not lost
-signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where a suite is in the background
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it is ignored
 
 for line in sys.stdin:
     words, error = json.loads(line)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from trdlab.deep.presets import preset
 from trdlab.runs.folder import is_run
-from trdlab.show.curves import save_learning_curves
+from trdlab.show.plots.training import save_learning_curves
 from trdlab.training.loading import evaluate_run
 from trdlab.training.run import begin, carry_on, resume
 

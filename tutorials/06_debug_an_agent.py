@@ -17,14 +17,16 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib import pyplot as plt
 
+from trdlab.agents import Agent
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explain import Agent, ModelEnvironments, assess, explain
+from trdlab.explain.copies import ModelEnvironments
+from trdlab.explanations import assess, explain, moment_at
+from trdlab.explanations.calibration.sentences import trust_sentences
+from trdlab.explanations.moment.sentences import sentence
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.show.sentences import sentence
-from trdlab.show.trust import plot_trust
-from trdlab.show.verdicts import trust_sentences
+from trdlab.show.plots.calibration import plot_trust
 from trdlab.tabular import exact
 
 from exercise import check
@@ -227,7 +229,7 @@ agents = {
 
 # %%
 for name, of in agents.items():
-    explanation = explain(of.moment(step=8))
+    explanation = explain(moment_at(of, step=8))
     print(f"{name}:")
     say(sentence(finding, explanation) for finding in explanation.forecast)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from trdlab.explain.playing import Playing
+from trdlab.rollouts.playing import Playing
 
 
 @pytest.fixture
@@ -72,7 +72,7 @@ def test_a_calibration_as_text_and_as_json(explain):
     code, out, _ = explain("gridworld:ledge", "--what", "calibration", "--json", "--episodes", 50)
     data = json.loads(out)
     assert code == 0
-    assert data["schema"] == "trdlab.explain/1"
+    assert data["schema"] == "trdlab.explanations/1"
     assert data["calibration"]["schema"] == "trdlab.trust/1"
     assert data["calibration"]["episodes"] == 50
     assert not Path("explanations").exists()

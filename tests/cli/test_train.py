@@ -254,7 +254,7 @@ def test_an_evaluation_as_json(trdlab, trained):
     code, out, err = trdlab("evaluate", trained, "--episodes", 2, "--seed", 3, "--json")
     assert code == 0
     data = json.loads(out)
-    assert data["schema"] == "trdlab.evaluation/1"
+    assert data["schema"] == "trdlab.rollouts.evaluation/1"
     assert (data["episodes"], data["seed"], len(data["returns"])) == (2, 3, 2)
     kept = Path(err.removeprefix("Kept: ").strip())
     assert json.loads(kept.read_text()) == {"agent_steps": 120, **data}

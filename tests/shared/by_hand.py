@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explain.episodes import Episode
+from trdlab.rollouts.episodes import Episode
 from trdlab.tabular import ExactTable
 
 

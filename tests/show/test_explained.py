@@ -7,19 +7,20 @@ from functools import cache
 import numpy as np
 import pytest
 
+from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import Moment, assess, explain, explain_agent, gridworld_agent
-from trdlab.explain.explained import Explained, Part, parse_parts
+from trdlab.explanations import Moment, assess, explain, explain_agent
+from trdlab.explanations.explained import Explained, Part, parse_parts
+from trdlab.explanations.moment.sentences import UnsupportedSentenceError
 from trdlab.show.explained import check_explained, summary, to_dict
-from trdlab.show.explained_plots import (
+from trdlab.show.plots.explained import (
     moment_figure,
     part_figure,
     picture_paths,
     trust_figure,
 )
-from trdlab.show.sentences import UnsupportedSentenceError
 
 
 @cache
@@ -56,7 +57,7 @@ def test_a_summary_answers_what_why_not_how_far_and_whose():
 def test_the_plain_data_has_the_numbers_and_their_sentences():
     found = explained(parts=("contrast", "calibration"), step=1)
     data = json.loads(json.dumps(to_dict(found), allow_nan=False))
-    assert data["schema"] == "trdlab.explain/1"
+    assert data["schema"] == "trdlab.explanations/1"
     assert data["time_axis"]["labels"] == ["t", "t+1", "t+2", "t+3", "t+4…∞"]
     moment, calibration = data["moment"], data["calibration"]
     assert (moment["seed"], moment["step"]) == (0, 1)

@@ -5,11 +5,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.explain.episodes import Episode
-from trdlab.explain.stories.played import Played
-from trdlab.explain.stories.story import tell
-from trdlab.explain.trust.trusted import Trust
-from trdlab.show.story_plots import plot_story, story_figure
+from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations.episode.played import Played
+from trdlab.explanations.episode.story import tell
+from trdlab.rollouts.episodes import Episode
+from trdlab.show.plots.episode import plot_story, story_figure
 
 
 def played(total: int, axis: TimeAxis, *, cost: bool = False) -> Played:

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console, RenderableType
 
 from trdlab.deep.settings import TrainSettings
-from trdlab.evaluation import Evaluation
+from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary
 from trdlab.show.training import duration, evaluation_page, memory_line, plan_page, runs_table
 from trdlab.training.setup import Plan

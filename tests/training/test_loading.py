@@ -18,10 +18,10 @@ from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
-from trdlab.explain import explain, moment_of
+from trdlab.explanations import explain, moment_of
+from trdlab.explanations.moment.sentences import check, sentences
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs import RunFolder, load_checkpoint
-from trdlab.show.sentences import check, sentences
 from trdlab.training.loading import evaluate_run, load
 from trdlab.training.run import begin, carry_on
 from trdlab.training.setup import described_space

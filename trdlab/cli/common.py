@@ -87,7 +87,7 @@ def publish(
     from trdlab.show import report as show
 
     if plot is not None:
-        from trdlab.show.plots import check_picture
+        from trdlab.show.plots.moment import check_picture
 
         check_picture(plot, overwrite=overwrite)
     report = solve()
@@ -97,7 +97,7 @@ def publish(
         console, ascii_only = new_console()
         console.print(show.page(report, ascii_only=ascii_only))
     if plot is not None:
-        from trdlab.show.plots import save_report
+        from trdlab.show.plots.moment import save_report
 
         save_report(report, plot)
         Console(stderr=True, highlight=False).print(

@@ -55,7 +55,7 @@ def compare(
     Both play episodes, and both are asked about the states of them all.
     """
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explain.comparison import pair as two
+    from trdlab.explanations.comparison import pair as two
     from trdlab.show import comparison as show
 
     agents = two.find_pair(
@@ -71,7 +71,7 @@ def compare(
 
         out = free_name(Path("explanations"), f"{agents[0].name}-against-{agents[1].name}")
     if out is not None:
-        from trdlab.show.comparison_plots import picture_path
+        from trdlab.show.plots.comparison import picture_path
 
         path = picture_path(out)
     errors = Console(stderr=True, highlight=False)
@@ -87,8 +87,8 @@ def compare(
         console, ascii_only = common.new_console()
         console.print(show.page(found, ascii_only=ascii_only))
     if out is not None:
-        from trdlab.show.comparison_plots import comparison_figure
-        from trdlab.show.pictures import write_picture
+        from trdlab.show.plots.comparison import comparison_figure
+        from trdlab.show.plots.pictures import write_picture
 
         write_picture(comparison_figure(found), path)
         errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

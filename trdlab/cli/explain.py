@@ -76,10 +76,10 @@ def explain(
     It plays an episode as the agent would, and explains one step of it.
     How far such forecasts can be trusted is judged by other episodes.
     """
+    from trdlab.agents.agent import find_agent
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.decomposition import TimeAxis
-    from trdlab.explain.agents import find_agent
-    from trdlab.explain.explained import explain_agent, parse_parts
+    from trdlab.explanations.explained import explain_agent, parse_parts
     from trdlab.show import explained as show
 
     parts = parse_parts(what)
@@ -101,7 +101,7 @@ def explain(
 
         out = free_name(Path("explanations"), found.name)
     if out is not None:
-        from trdlab.show.explained_plots import picture_paths
+        from trdlab.show.plots.explained import picture_paths
 
         paths = picture_paths(out, parts, seed=seed, step=step)
     errors = Console(stderr=True, highlight=False)
@@ -123,7 +123,7 @@ def explain(
         console, ascii_only = common.new_console()
         console.print(show.page(explained, ascii_only=ascii_only))
     if out is not None:
-        from trdlab.show.explained_plots import write_pictures
+        from trdlab.show.plots.explained import write_pictures
 
         for path in write_pictures(explained, paths):
             errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

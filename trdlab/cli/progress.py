@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 if TYPE_CHECKING:
     from trdlab.deep.trainer import Trainer, TrainMetrics
-    from trdlab.explain.playing import Progress as Playing
+    from trdlab.rollouts.playing import Progress as Playing
 
 _LINE_SECONDS = 10.0
 _BAR_SECONDS = 0.1

@@ -10,14 +10,14 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 
 from trdlab.arrays import FloatArray
-from trdlab.explain.comparison import background, differences
-from trdlab.explain.comparison.differences import ComparisonFinding
-from trdlab.explain.comparison.findings import comparison_findings
-from trdlab.explain.comparison.report import SIDES, Comparison
-from trdlab.explain.finding import Claim
+from trdlab.explanations.claims import Claim
+from trdlab.explanations.comparison import background, differences
+from trdlab.explanations.comparison.differences import ComparisonFinding
+from trdlab.explanations.comparison.findings import comparison_findings
+from trdlab.explanations.comparison.report import SIDES, Comparison
+from trdlab.explanations.slots import Form, Language, forms_of
 from trdlab.formatting import decimals_for, number
-from trdlab.show.templates import Form, Language, forms_of
-from trdlab.show.text import fit, paragraph, vector
+from trdlab.show.page import fit, paragraph, vector
 from trdlab.statistics import Estimate
 from trdlab.time_axis import axis_title
 

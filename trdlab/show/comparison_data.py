@@ -3,9 +3,9 @@
 from dataclasses import asdict
 from typing import Any
 
-from trdlab.explain.comparison.findings import comparison_findings
-from trdlab.explain.comparison.report import SIDES, Comparison
-from trdlab.explain.trust.intervals import Estimates
+from trdlab.explanations.comparison.findings import comparison_findings
+from trdlab.explanations.comparison.report import SIDES, Comparison
+from trdlab.intervals import Estimates
 from trdlab.show.comparison import FURTHEST, LANGUAGE, explain_command
 from trdlab.show.trust_data import plain_data, trust_to_dict
 

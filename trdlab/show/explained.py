@@ -6,24 +6,24 @@ from typing import Any
 
 from rich.console import Group, RenderableType
 
-from trdlab.explain.contrast import in_short
-from trdlab.explain.explained import FIELDS, PARTS, Explained
-from trdlab.explain.explanation import Explanation
-from trdlab.explain.finding import Claim, Finding
-from trdlab.explain.tried import Trial, trial_findings
-from trdlab.explain.trust.findings import trust_findings
-from trdlab.explain.trust.report import TrustReport
+from trdlab.explanations.calibration.findings import trust_findings
+from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.sentences import REPORTS, trust_sentence
+from trdlab.explanations.claims import Claim, Finding
+from trdlab.explanations.explained import FIELDS, PARTS, Explained
+from trdlab.explanations.moment.contrast import in_short
+from trdlab.explanations.moment.explanation import Explanation
+from trdlab.explanations.moment.outcome import Trial, trial_findings
+from trdlab.explanations.moment.sentences import MOMENTS, sentence
+from trdlab.explanations.moment.trials import TRIALS, trial_sentence, trial_sentences
+from trdlab.explanations.slots import Language, checked, split
+from trdlab.show.page import action_table, paragraph, story
 from trdlab.show.report import actions_to_dict
-from trdlab.show.sentences import MOMENTS, sentence
 from trdlab.show.story import STORIES, story_lines, story_sentence, story_to_dict
-from trdlab.show.templates import Language, checked, split
-from trdlab.show.text import action_table, paragraph, story
-from trdlab.show.trials import TRIALS, trial_sentence, trial_sentences
 from trdlab.show.trust_data import plain_data, trust_to_dict
-from trdlab.show.verdicts import REPORTS, trust_sentence
 from trdlab.time_axis import axis_title
 
-SCHEMA = "trdlab.explain/1"
+SCHEMA = "trdlab.explanations/1"
 
 _FAULTS = (
     "too-late",
@@ -155,7 +155,7 @@ def check_explained(text: str, explained: Explained) -> list[Claim]:
 def to_dict(explained: Explained) -> dict[str, Any]:
     """Returns the explanation as plain data at full precision.
 
-    The schema is `trdlab.explain/1`: what was not asked for, and what is not known, is `null`.
+    The schema is `trdlab.explanations/1`: what was not asked for, and what is not known, is `null`.
     """
     explanation, report, axis = explained.explanation, explained.report, explained.time_axis
     moment = None

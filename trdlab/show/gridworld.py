@@ -9,13 +9,13 @@ from rich.table import Table
 from rich.text import Text
 
 from trdlab.decomposition import TimeAxis
-from trdlab.explain.explanation import explain
-from trdlab.explain.tabular import gridworld_moment
+from trdlab.explanations.moment.exact import gridworld_moment
+from trdlab.explanations.moment.explanation import explain
 from trdlab.formatting import amount, plain
 from trdlab.gridworld import Gridworld, load_map, map_names
 from trdlab.gridworld.ansi import DRONE, ansi
+from trdlab.show.page import fit
 from trdlab.show.report import Report, Scene
-from trdlab.show.text import fit
 from trdlab.tabular import Ties, exact
 
 SCHEMA = "trdlab.gridworld/1"

@@ -10,12 +10,12 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from trdlab.explain.explanation import Explanation
-from trdlab.explain.moment import Moment
-from trdlab.explain.tabular import MAX_WHAT_IF_STATES
+from trdlab.explanations.moment.exact import MAX_WHAT_IF_STATES
+from trdlab.explanations.moment.explanation import Explanation
+from trdlab.explanations.moment.moment import Moment
+from trdlab.explanations.moment.sentences import sentence
 from trdlab.formatting import plain
-from trdlab.show.sentences import sentence
-from trdlab.show.text import action_table, fit, story
+from trdlab.show.page import action_table, fit, story
 from trdlab.tabular import ExactTable
 
 _MOST_ERROR = 1e-6  # of the largest Q-value, beyond which it is not called exact

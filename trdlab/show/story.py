@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from trdlab.explain.finding import Claim, Shown
-from trdlab.explain.stories import promises, story, surprises
-from trdlab.explain.stories.played import Played, StoryClaim
-from trdlab.explain.stories.story import Story, first_end
+from trdlab.explanations.claims import Claim, Shown
+from trdlab.explanations.episode import promises, story, surprises
+from trdlab.explanations.episode.played import Played, StoryClaim
+from trdlab.explanations.episode.story import Story, first_end
+from trdlab.explanations.slots import Form, Language, forms_of
 from trdlab.formatting import amount, number
-from trdlab.show.templates import Form, Language, forms_of
 from trdlab.show.trust_data import plain_data
 from trdlab.time_axis import TimeAxis
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.arguments import say_arguments
-from trdlab.explain.explanation import explain
-from trdlab.explain.leads import difference
-from trdlab.explain.moment import Moment
-from trdlab.explain.tabular import gamma_what_ifs, tabular_moment
+from trdlab.explanations.moment.exact import gamma_what_ifs, tabular_moment
+from trdlab.explanations.moment.explanation import explain
+from trdlab.explanations.moment.leads import difference
+from trdlab.explanations.moment.moment import Moment
 from trdlab.formatting import plain
 from trdlab.show.report import Report, Scene
 from trdlab.tabular import Ties, exact

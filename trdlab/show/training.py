@@ -8,10 +8,10 @@ from rich.text import Text
 
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError
-from trdlab.evaluation import Evaluation
 from trdlab.formatting import decimals_for
+from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary, to_toml
-from trdlab.show.text import fit
+from trdlab.show.page import fit
 from trdlab.training.setup import Plan
 
 

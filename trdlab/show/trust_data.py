@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from trdlab.explain.trust.findings import trust_findings
-from trdlab.explain.trust.report import TrustReport
-from trdlab.explain.trust.trusted import Trust
-from trdlab.show.verdicts import trust_sentence
+from trdlab.explanations.calibration.findings import trust_findings
+from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.sentences import trust_sentence
+from trdlab.explanations.calibration.trust import Trust
 
 SCHEMA = "trdlab.trust/1"
 

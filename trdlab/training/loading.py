@@ -8,8 +8,8 @@ import gymnasium as gym
 
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import TrdlabError
-from trdlab.evaluation import Evaluation, evaluate
 from trdlab.files import write_json
+from trdlab.rollouts.evaluation import Evaluation, evaluate
 from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
 from trdlab.training.setup import described_space, future, make_environments, use_threads
 

@@ -1,0 +1,225 @@
+"""What is told of an episode is read back and tested, over episodes real and random."""
+
+import json
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mutants
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.explain.copies import ModelEnvironments
+from trdlab.explanations import UnsupportedSentenceError
+from trdlab.explanations.episode.played import Played, StoryClaim
+from trdlab.explanations.episode.promises import foreseen
+from trdlab.explanations.episode.story import tell
+from trdlab.explanations.episode.surprises import sizes, surprise
+from trdlab.gridworld import Gridworld, load_map
+from trdlab.rollouts.episodes import Episode, collect
+from trdlab.rollouts.realised import what_followed
+from trdlab.show.story import (
+    TEMPLATES,
+    check_story,
+    story_sentence,
+    story_sentences,
+    story_to_dict,
+)
+from trdlab.tabular import exact
+
+NAMES = ("up", "down", "FIRE", "move left")
+WORDS = {
+    "better": "worse",
+    "worse": "better",
+    "put off": "brought forward",
+    "brought forward": "put off",
+    "ended": "was cut off",
+    "was cut off": "ended",
+    "never came": "came",
+    "came only at": "never came but at",
+    "no rewards": "many rewards",
+    "largest": "smallest",
+    "gained": "lost",
+    "foreseen": "missed",
+    "as early as it could be": "as late as it could be",
+    ", as early as it could be": "",
+    "No step": "Every step",
+    "as it had expected": "which it had not expected",
+    "in all; it": "up to step 1, where a life was lost; it",
+    "a life was lost": "the episode ended",
+    "the episode ended": "a life was lost",
+    "no reward came": "a reward of 1 came",
+    "above all": "not at all",
+    "half": "all",
+}
+
+
+@cache
+def real() -> tuple[Played, ...]:
+    """Episodes of the exact tables of some worlds."""
+    found = []
+    for name, slip, axis, seconds in (
+        ("drone", 0.0, TimeAxis(0.95, 4), None),
+        ("bridge", 0.2, TimeAxis(0.95, 12), 0.25),
+        ("loop", 0.2, TimeAxis(0.9, 3, 3), 0.25),
+        ("windy", 0.2, TimeAxis(0.95, 0), None),
+        ("ledge", 0.2, TimeAxis(0.95, 4), None),
+        ("patience", 0.2, TimeAxis(0.95, 1), None),
+    ):
+        world = Gridworld(load_map(name).with_slip(slip))
+        table = exact(world.mdp, axis)
+        play = ModelEnvironments(world.mdp, 6, seed=0, time_limit=60)
+        found += [Played(e, world.action_names, seconds) for e in collect(table, play)]
+    return tuple(found)
+
+
+@st.composite
+def episodes(draw: st.DrawFn) -> Played:
+    """Random episodes: of any forecasts, of true ones changed at a step, of promises that stay."""
+    axis = TimeAxis(
+        draw(st.sampled_from([0.0, 0.3, 0.95, 0.999])),
+        draw(st.integers(0, 5)),
+        draw(st.sampled_from([1, 1, 2, 3])),
+    )
+    total, rng = draw(st.integers(1, 25)), np.random.default_rng(draw(st.integers(0, 2**32)))
+    size = draw(st.sampled_from([1e-6, 0.01, 1.0, 1.0, 1e5]))
+    rewards = rng.choice(
+        draw(st.sampled_from([(0.0, 1.0), (0.0, -1.0, 2.5), (0.0,), (1.0,)])), total
+    )
+    lives = (rng.random(total) < draw(st.sampled_from([0.0, 0.0, 0.1]))) & (
+        np.arange(total) < total - 1
+    )
+    terminated = draw(st.booleans())
+    ends = lives & draw(st.booleans())
+    ends[-1] = terminated
+    episode = Episode(
+        decomposition=RewardDecomposition(np.zeros((total, 4, axis.num_components)), axis),
+        expected=np.zeros((total + 1, axis.num_components)),
+        actions=rng.integers(4, size=total),
+        rewards=rewards * size,
+        life_lost=lives,
+        ends=ends,
+        terminated=terminated,
+        random=np.zeros(total + axis.num_steps, dtype=np.bool_),
+    )
+    expected = np.zeros((total + 1, axis.num_components))
+    kind = draw(st.sampled_from(["any", "true", "changed", "stays", "late", "many"]))
+    if kind in ("true", "changed"):
+        expected[:-1] = what_followed(episode)[0]
+    if kind == "changed":
+        expected[rng.integers(total)] += rng.normal(size=axis.num_components) * size
+    if kind in ("any", "many"):
+        noise = rng.normal(size=expected.shape) * (rng.random(expected.shape) < 0.5)
+        expected = size * (
+            noise if kind == "any" else np.abs(noise) * rng.integers(2, size=(total + 1, 1))
+        )
+    if kind == "late":
+        episode.rewards[:] = size * (np.arange(total) == total - 1)
+        expected[-3:, 0] = size
+    if kind in ("stays", "late"):
+        stop = total + 1 if kind == "stays" else total - 2
+        expected[:stop, min(axis.horizon, 1 + rng.integers(2))] = size
+    components = rng.normal(size=(total, 4, axis.num_components)) * size
+    components[np.arange(total), episode.actions] = expected[:-1]
+    object.__setattr__(episode, "decomposition", RewardDecomposition(components, axis))
+    object.__setattr__(episode, "expected", expected)
+    return Played(episode, NAMES, draw(st.sampled_from([None, 0.25, 1 / 15])))
+
+
+def mutations(sentence: str, names: tuple[str, ...] = NAMES) -> list[str]:
+    """Returns the sentence with each number changed in its last digit, other words and names."""
+    result = [*mutants.numbers(sentence), *mutants.words(sentence, WORDS)]
+    named = re.match(rf"(With )?({'|'.join(names)})\b", sentence, re.IGNORECASE)
+    if named:
+        others = [name for name in ("sideways", *names) if name.lower() != named[2].lower()]
+        result += [sentence.replace(named[2], name, 1) for name in others]
+    return result
+
+
+def true_elsewhere(played: Played) -> set[str]:
+    """Returns what can be said of each single step: another number of a step may lead there."""
+    rows = range(len(played.revision))
+    claims = [surprise(played, row) for row in rows if sizes(played)[row] > 0.0]
+    return {story_sentence(claim, played) for claim in (*claims, *foreseen(played))}
+
+
+def survivors(played: Played) -> list[str]:
+    said = story_sentences(tell(played))
+    found = (mutant for text in said for mutant in mutations(text, played.action_names))
+    true = true_elsewhere(played)
+    survived = mutants.survivors(found, lambda text: check_story(text, played))
+    return [mutant for mutant in survived if mutant not in true]
+
+
+def test_every_sentence_about_a_real_episode_is_supported_and_no_mutation_is():
+    for played in real():
+        story = tell(played)
+        claims = check_story(" ".join(story_sentences(story)), played)
+        assert [type(claim) for claim in claims] == [type(x) for x in story.findings]
+        assert survivors(played) == []
+    assert sum(len(mutations(s)) for p in real() for s in story_sentences(tell(p))) > 500
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(episodes())
+def test_every_sentence_about_any_episode_is_supported(played: Played):
+    story = tell(played)
+    assert all(finding.holds(played) for finding in story.findings)
+    claims = check_story(" ".join(story_sentences(story)), played)
+    assert [type(claim) for claim in claims] == [type(x) for x in story.findings]
+    assert len(story.findings) <= 8
+    assert story.most is None or story.most in story.moments
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(episodes())
+def test_a_mutated_number_name_or_word_about_any_episode_fails(played: Played):
+    assert survivors(played) == []
+
+
+def test_every_kind_of_claim_occurs_and_has_a_sentence():
+    seen: set[type[StoryClaim]] = {type(x) for played in real() for x in tell(played).findings}
+
+    @settings(max_examples=1000, deadline=None, derandomize=True)
+    @given(episodes())
+    def look(played: Played) -> None:
+        seen.update(map(type, tell(played).findings))
+
+    look()
+    assert set(TEMPLATES) == set(StoryClaim.kinds.values())
+    assert seen == set(TEMPLATES), f"never found: {set(TEMPLATES) - seen}"
+
+
+def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
+    with pytest.raises(UnsupportedSentenceError, match="no statement about this episode"):
+        check_story("It played well.", real()[0])
+    with pytest.raises(UnsupportedSentenceError, match="is not true of this episode"):
+        check_story("The episode ended after 6 steps.", real()[0])
+    with pytest.raises(UnsupportedSentenceError, match="is not true of this episode"):
+        check_story(
+            "From step 1 to step 90 a reward stayed 9 steps away; it never came.", real()[0]
+        )
+
+
+def test_the_plain_data_has_the_numbers_and_their_sentences():
+    played = real()[7]
+    data = json.loads(json.dumps(story_to_dict(tell(played)), allow_nan=False))
+    assert data["steps"] == len(data["actions"]) == len(data["rewards"])
+    np.testing.assert_array_equal(data["values"], played.episode.predicted.sum(axis=1))
+    np.testing.assert_array_equal(data["td_errors"], played.revision.change.sum(axis=1))
+    text = " ".join(finding["sentence"] for finding in data["findings"])
+    assert [claim.kind() for claim in check_story(text, played)] == [
+        finding["kind"] for finding in data["findings"]
+    ]
+
+
+def test_a_story_reads_well():
+    assert story_sentences(tell(real()[0])) == [
+        "At the start it expected rewards worth 3.52 in all; the largest component is that of t+1.",
+        "The reward of 1 at step 3 was foreseen 3 steps before, as early as it could be.",
+        "No step changed what it expected.",
+        "The episode ended after 5 steps.",
+        "Seen from the start, it got rewards worth 3.52 in all, as it had expected.",
+    ]

@@ -1,0 +1,225 @@
+"""What is told of an episode: key moments, rewards foreseen, promises broken."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from by_hand import episode
+from trdlab.arrays import FloatArray
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.estimator import Future
+from trdlab.explain.copies import ModelEnvironments
+from trdlab.explanations.episode.played import Played
+from trdlab.explanations.episode.promises import (
+    BrokenPromise,
+    Foreseen,
+    ForeseenFully,
+    LatePromise,
+    OverduePromise,
+    broken_promises,
+    foreseen,
+)
+from trdlab.explanations.episode.story import AsExpected, OtherThanExpected, key_rows, tell
+from trdlab.explanations.episode.surprises import (
+    BeliefSurprise,
+    EndSurprise,
+    Moved,
+    NoRewardSurprise,
+    RewardSurprise,
+    sizes,
+)
+from trdlab.gridworld import Gridworld, load_map, map_names
+from trdlab.rollouts.episodes import collect
+from trdlab.tabular import exact
+
+AXIS = TimeAxis(0.5, 4)
+
+
+def played(expected: Any, rewards: list[float], axis: TimeAxis = AXIS, **changes: Any) -> Played:
+    """An episode of one action, by what was expected at every observation."""
+    return Played(episode(rewards, axis, expected, **changes), ("wait",))
+
+
+def foretold(rewards: list[float], axis: TimeAxis = AXIS) -> FloatArray:
+    """Returns `[T+1, N+1]`: the rewards that follow each step, for w = 1."""
+    total = len(rewards)
+    rows = np.zeros((total + 1, axis.num_components))
+    for t in range(total):
+        for k, reward in enumerate(rewards[t:]):
+            rows[t, min(k, axis.horizon)] += axis.gamma**k * reward
+    return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Always:
+    """An estimator that expects the same of every observation and action."""
+
+    row: FloatArray
+    time_axis: TimeAxis
+    num_actions: int
+    future = Future("the given policy")
+
+    def decompose(self, observations: Any) -> RewardDecomposition:
+        shape = (len(observations), self.num_actions, self.time_axis.num_components)
+        return RewardDecomposition(np.broadcast_to(self.row, shape).copy(), self.time_axis)
+
+
+# ---- surprises -----------------------------------------------------------------------------------
+
+
+def test_each_surprise_has_its_reason():
+    rows = foretold([0.0, 0.0, 1.0])
+    rows[1] += [0.0, 0.0, 0.0, 0.25, 0.0]  # a promise that the next step takes back
+    changed = played(rows, [0.0, 0.0, 1.0])
+    claims = {claim.place: claim for claim in tell(changed).moments if hasattr(claim, "gap")}
+    assert claims == {
+        0: BeliefSurprise(0, "wait", 0.125, "better", 4, 0.0, 0.125),
+        1: BeliefSurprise(1, "wait", 0.25, "worse", 3, 0.25, 0.0),
+    }
+    more = played(foretold([0.0, 0.5]), [0.0, 2.0])
+    assert tell(more).moments == (RewardSurprise(1, "wait", 1.5, "better", 2.0, 0.5),)
+    none = played(foretold([0.0, 0.5]), [0.0, 0.0])
+    assert tell(none).moments == (NoRewardSurprise(1, "wait", 0.5, "worse", 0.5),)
+    early = played(foretold([1.0, 1.0, 1.0, 1.0])[:3], [1.0, 1.0])
+    assert tell(early).moments == (
+        EndSurprise(1, "wait", 0.75, "worse", "the episode ended", 0.75),
+    )
+
+
+def test_a_reward_that_comes_at_another_step_is_one_of_timing():
+    rows = foretold([0.0, 1.0, 0.0, 0.0])
+    rows[2] = [0.0, 0.5, 0.0, 0.0, 0.0]  # at step 1 it did not come: it is now expected at step 3
+    rows[1] = [0.25, 0.0, 0.0, 0.0, 0.0]
+    rows[0] = [0.0, 0.125, 0.0, 0.0, 0.0]
+    rows[3] = [1.0, 0.0, 0.0, 0.0, 0.0]
+    late = played(rows, [0.0, 0.0, 0.0, 1.0])
+    assert tell(late).moments[0] == Moved(1, "wait", "rewards", 0.25, 0, 2, "put off")
+    costly = played(-rows, [0.0, 0.0, 0.0, -1.0])
+    assert tell(costly).moments[0] == Moved(1, "wait", "costs", 0.25, 0, 2, "put off")
+
+
+def test_key_moments_are_spread_over_the_episode():
+    rng = np.random.default_rng(0)
+    rewards = rng.normal(size=200)
+    rewards[100:110] += 20.0  # all that surprises most is here
+    told = played(np.zeros((201, 5)), rewards.tolist())
+    rows = key_rows(told, 5)
+    assert len(rows) == 5
+    assert 100 <= rows[0] < 110
+    assert np.diff(sorted(rows)).min() >= 200 / 10
+    assert sizes(told)[rows].tolist() == sorted(sizes(told)[rows], reverse=True)
+    assert len(tell(told).findings) <= 8
+
+
+def test_where_nothing_surprises_nothing_is_made_of_it():
+    story = tell(played(foretold([0.0, 1.0, 0.0, 4.0]), [0.0, 1.0, 0.0, 4.0]))
+    assert [claim.kind() for claim in story.findings] == [
+        "expected-at-start",
+        "foreseen-fully",
+        "nothing-changed",
+        "ended",
+        "as-expected",
+    ]
+    assert story.most is None
+
+
+def test_what_came_is_held_against_what_was_expected_only_where_it_is_known():
+    rows, rewards = foretold([1.0, 1.0]), [1.0, 3.0]
+    assert tell(played(rows, rewards)).end[-1] == OtherThanExpected(2.5, 1, 1.5)
+    assert tell(played(rows, [1.0, 1.0])).end[-1] == AsExpected(1.5, 1)
+    assert tell(played(rows, rewards, terminated=False)).end[-1].kind() == "cut-off"
+    ends = np.array([True, True])
+    lost = played(rows, rewards, life_lost=np.array([True, False]), ends=ends)
+    assert tell(lost).end[-1] == OtherThanExpected(1.0, 0, 1.5)
+
+
+# ---- rewards that were foreseen ------------------------------------------------------------------
+
+
+def test_how_long_before_a_reward_was_foreseen():
+    rewards = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    rows = foretold(rewards)
+    assert foreseen(played(rows, rewards)) == (
+        ForeseenFully(1.0, 4, 3),
+    )  # t+3 is the last explicit
+    rows[2] *= 0.49  # less than half of it
+    assert foreseen(played(rows, rewards)) == (Foreseen(1.0, 4, 1),)
+    rows[3] *= 0.49
+    assert foreseen(played(rows, rewards)) == ()
+    start = [0.0, 0.0, 1.0]
+    assert foreseen(played(foretold(start), start)) == (ForeseenFully(1.0, 2, 2),)
+
+
+def test_the_largest_reward_that_was_foreseen_is_told_and_none_that_always_comes():
+    rewards = [0.0, 1.0, 5.0, 2.0]
+    rows = foretold(rewards)
+    rows[2, 0] = 0.0  # the 5
+    assert foreseen(played(rows, rewards)) == (
+        ForeseenFully(2.0, 3, 3),
+        ForeseenFully(1.0, 1, 1),
+    )
+    assert foreseen(played(foretold([1.0] * 4), [1.0] * 4)) == ()
+
+
+def test_a_group_foresees_a_reward_at_any_of_its_steps():
+    axis = TimeAxis(0.5, 2, 2)
+    rows = [[0.0, 0.5**3, 0.0], [0.0, 0.25, 0.0], [0.5, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0] * 3]
+    found = foreseen(played(rows, [0.0, 0.0, 0.0, 1.0], axis))
+    assert found == (ForeseenFully(1.0, 3, 3),)
+
+
+# ---- promises ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("component", [1, 3])
+def test_an_agent_that_circles_promises_what_never_comes(component):
+    world = Gridworld(load_map("drone"))
+    axis, row = TimeAxis(0.95, 5), np.zeros(6)
+    row[component] = 0.95**component
+    estimator = Always(row, axis, len(world.action_names))
+    (circling,) = collect(estimator, ModelEnvironments(world.mdp, 1, seed=0, time_limit=20))
+    told = Played(circling, world.action_names)
+    assert circling.rewards.sum() == 0.0
+    assert broken_promises(told) == (OverduePromise(0, 19, component),)  # it was cut off
+    assert tell(told).most == OverduePromise(0, 19, component)
+    assert len(tell(told).moments) == 1  # and not each step of it
+
+
+def test_a_promise_that_is_kept_later_is_late_and_one_that_is_kept_in_time_is_none():
+    stay, axis = [0.0, 0.25, 0.0], TimeAxis(0.5, 2)
+    rows = [*[stay] * 8, [0.0, 0.5, 0.0], [1.0, 0.0, 0.0], [0.0] * 3]
+    late = played(rows, [*[0.0] * 9, 1.0], axis)
+    assert broken_promises(late) == (LatePromise(0, 8, 1, 9),)
+    kept = played([*[stay] * 8, [0.0] * 3], [0.0] * 4 + [1.0] * 4, axis)
+    assert broken_promises(kept) == ()
+    few = played([*[stay] * 5, *[[0.0] * 3] * 4], [0.0] * 8, axis)
+    assert broken_promises(few) == ()
+
+
+def test_a_claim_about_a_part_of_the_stay_does_not_hold():
+    told = played([[0.0, 0.5, 0.0]] * 11, [0.0] * 10, TimeAxis(0.5, 2), terminated=False)
+    assert OverduePromise(0, 9, 1).holds(told)
+    assert not BrokenPromise(0, 9, 1).holds(told)  # what was cut off can still have come
+    for first, last, component in ((1, 9, 1), (0, 8, 1), (0, 9, 0), (0, 10, 1), (-1, 9, 1)):
+        assert not OverduePromise(first, last, component).holds(told)
+
+
+def test_for_wider_groups_a_promise_may_stay_as_long_as_they_are():
+    axis = TimeAxis(1.0 - 1e-9, 3, 4)
+    rows = [[0.0, 1.0, 0.0, 0.0]] * 8 + [[0.0] * 4]
+    assert broken_promises(played(rows, [0.0] * 8, axis)) == ()  # steps 4 to 7 later: not overdue
+    rows = [[0.0, 1.0, 0.0, 0.0]] * 9 + [[0.0] * 4]
+    assert broken_promises(played(rows, [0.0] * 9, axis)) == (BrokenPromise(0, 8, 1),)
+
+
+@pytest.mark.parametrize("name", map_names())
+def test_no_exact_table_breaks_a_promise(name):
+    for slip, axis in ((None, TimeAxis(0.95, 12)), (0.2, TimeAxis(0.95, 4)), (0.2, AXIS)):
+        grid = load_map(name)
+        world = Gridworld(grid if slip is None else grid.with_slip(slip))
+        table = exact(world.mdp, axis)
+        play = ModelEnvironments(world.mdp, 10, seed=0, time_limit=200)
+        for one in collect(table, play):
+            assert broken_promises(Played(one, world.action_names)) == ()

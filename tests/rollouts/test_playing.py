@@ -1,0 +1,65 @@
+"""Playing: a lone episode is the same wherever it is played, and is cut off where it should be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trdlab.agents import Agent, gridworld_agent
+from trdlab.decomposition import TimeAxis
+from trdlab.errors import InputError
+from trdlab.explain.copies import ModelEnvironments
+from trdlab.explanations import assess, play
+from trdlab.rollouts import collect
+from trdlab.rollouts.playing import Progress, usual_limit
+from trdlab.rollouts.realised import what_followed
+
+AXIS = TimeAxis(0.9, 2, 2)
+
+
+def undecided() -> Agent:
+    """Returns an agent that takes each action as likely as any other."""
+    agent = gridworld_agent("ledge,slip=0.3", AXIS)
+    return replace(agent, policy=lambda states: np.full((len(states), 4), 0.25))
+
+
+def test_a_limit_of_ours_is_like_one_of_the_environment():
+    agent = undecided()
+    assert agent.world is not None
+    mdp = agent.world.mdp
+    own, ours = (ModelEnvironments(mdp, 20, seed=3, time_limit=limit) for limit in (6, 50))
+    how = {"policy": agent.policy, "seed": 4}
+    expected = collect(agent.estimator, own, **how)
+    found = collect(agent.estimator, ours, max_steps=6, **how)
+    assert any(not episode.terminated for episode in found)
+    for one, other in zip(found, expected, strict=True):
+        assert (one.time_limit, one.terminated, len(one)) == (6, other.terminated, len(other))
+        np.testing.assert_array_equal(one.actions, other.actions)
+        np.testing.assert_array_equal(one.expected, other.expected)
+        for known, true in zip(what_followed(one), what_followed(other), strict=True):
+            np.testing.assert_array_equal(known, true)
+        assert not what_followed(one)[1][3:, 1].any()  # t+2 … t+3 of step 3 reaches beyond step 5
+
+
+def test_an_episode_of_no_step_is_refused():
+    with pytest.raises(InputError, match="Episodes have 0 steps"):
+        play(undecided(), max_steps=0)
+
+
+def test_episodes_last_four_horizons_at_least():
+    assert usual_limit(TimeAxis(0.9, 4)) == 1_000
+    assert usual_limit(TimeAxis(0.9, 200, 2)) == 1_600
+
+
+def test_it_is_told_how_far_episodes_are():
+    heard: list[Progress] = []
+    agent = gridworld_agent("ledge,slip=0.3", AXIS)
+    assess(agent, episodes=12, copying=agent.copying, watch=heard.append)
+    assert list(dict.fromkeys(progress.what for progress in heard)) == [
+        "episodes to judge by",
+        "episodes with copies",
+        "episodes with copies of first actions",
+    ]
+    first = [progress for progress in heard if progress.what == "episodes to judge by"]
+    assert [progress.steps for progress in first] == list(range(1, len(first) + 1))
+    assert (first[-1].finished, first[-1].episodes) == (12, 12)

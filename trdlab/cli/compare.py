@@ -55,7 +55,7 @@ def compare(
     Both play episodes, and both are asked about the states of them all.
     """
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explanations.comparison import pair as two
+    from trdlab.explanations.comparison import compare as two
     from trdlab.show import comparison as show
 
     agents = two.find_pair(

@@ -21,13 +21,13 @@ from trdlab.agents import Agent
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import assess, explain, moment_at
 from trdlab.explanations.calibration.sentences import trust_sentences
 from trdlab.explanations.moment.sentences import sentence
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.show.plots.calibration import plot_trust
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 from exercise import check
 

@@ -8,11 +8,11 @@ import pytest
 from trdlab.agents import Agent, gridworld_agent
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import assess, play
 from trdlab.rollouts import collect
 from trdlab.rollouts.playing import Progress, usual_limit
 from trdlab.rollouts.realised import what_followed
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.9, 2, 2)
 

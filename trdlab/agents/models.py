@@ -9,10 +9,10 @@ from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.arguments import parse_arguments, say_arguments
 from trdlab.errors import InputError, closest
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs.folder import is_run
+from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.reach import reachable
 from trdlab.tabular.toytext import make_world

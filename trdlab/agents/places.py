@@ -8,9 +8,9 @@ from trdlab.agents.models import World, find_model, is_model
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
+from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.stack import observation_space
 from trdlab.errors import InputError
-from trdlab.explain.copies import CopyableGymEnvironments
 
 Make = Callable[[int, int], Environments]
 """From the number of environments and their seed to the environments."""
@@ -47,7 +47,7 @@ def find_place(env: str, env_arguments: Sequence[str], time_axis: TimeAxis) -> P
     if not is_model(env):
         arguments = parse_arguments(env_arguments)
         return Place(
-            lambda num_envs, seed: CopyableGymEnvironments(
+            lambda num_envs, seed: GymEnvironments(
                 env, num_envs, seed=seed, env_arguments=arguments
             ),
             words,

@@ -14,7 +14,6 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Step
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations.calibration.calibration import calibrate, endings
 from trdlab.explanations.calibration.errors import blame, is_off
 from trdlab.explanations.calibration.residual import exact_tails, hidden, sufficient_horizon
@@ -23,6 +22,7 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.rollouts.episodes import Counting, Episode, collect
 from trdlab.rollouts.realised import pool, what_followed
 from trdlab.tabular import ExactTable, exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 20)
 

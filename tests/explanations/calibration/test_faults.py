@@ -13,7 +13,6 @@ from trdlab.bellman import target
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations.calibration.consistency import Audit, audit
 from trdlab.explanations.calibration.errors import blame
 from trdlab.explanations.calibration.faults import (
@@ -28,6 +27,7 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import pool
 from trdlab.tabular import MDP, exact, learn
+from trdlab.tabular.episodes import ModelEnvironments
 
 SINGLE, PAIRS = TimeAxis(0.95, 12), TimeAxis(0.95, 6, 2)
 GREEDY = Future("the greedy policy")

@@ -13,7 +13,6 @@ import mutants
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import UnsupportedSentenceError
 from trdlab.explanations.calibration.calibration import Calibration, Endings, State
 from trdlab.explanations.calibration.ceiling import Ceiling
@@ -33,6 +32,7 @@ from trdlab.rollouts.episodes import collect
 from trdlab.show.plots.calibration import plot_trust
 from trdlab.statistics import Estimate
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 WORDS = {
     "can be": "cannot be",

@@ -10,7 +10,6 @@ from trdlab.agents.agent import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import check, explain_agent, sentences
 from trdlab.explanations.calibration.report import judge
 from trdlab.explanations.calibration.trust import Trust
@@ -38,6 +37,7 @@ from trdlab.explanations.moment.moment import Moment, Uncertainty, moment_of
 from trdlab.gridworld import Gridworld, load_map, parse_map
 from trdlab.rollouts.episodes import collect
 from trdlab.tabular import exact, learn
+from trdlab.tabular.episodes import ModelEnvironments
 
 GAMMA = 0.95
 F = TypeVar("F", bound=Finding)

@@ -12,6 +12,7 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Environments, GymEnvironments
 from trdlab.errors import InputError
 from trdlab.explanations import assess, check, explain, moment_at, sentences
+from trdlab.policies import Memoryless
 from trdlab.rollouts import Copying, collect
 from trdlab.tabular import MDP, ExactTable, ModelEnvironments, exact
 
@@ -135,7 +136,7 @@ def test_moments_are_found_in_short_episodes_beside_a_few_that_never_end(seed):
 
 def test_a_step_is_of_the_episode_that_the_story_tells():
     agent = gridworld_agent("ledge", AXIS)
-    uniform = replace(agent, policy=lambda states: np.full((len(states), 4), 0.25))
+    uniform = replace(agent, policy=Memoryless(lambda states: np.full((len(states), 4), 0.25)))
     for seed in range(5):
         environments = uniform.make(1, seed)
         (episode,) = collect(agent.estimator, environments, policy=uniform.policy, seed=seed)

@@ -98,8 +98,8 @@ def test_in_the_wrappers(drone, tmp_path, pixels):
             Future(
                 "the greedy policy of the network (for the first 2 steps, the ε-greedy one it "
                 "learned from)",
-                "sign of each reward",
-                "a lost life, or the end of the game",
+                clip_rewards=True,
+                life_loss_ends=True,
             ),
         ),
     ],

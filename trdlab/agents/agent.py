@@ -1,6 +1,7 @@
 """The agent that is explained: an estimator, the policy it describes, and where it acts."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,9 +21,10 @@ from trdlab.environments import Environments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.gridworld import map_names
+from trdlab.policies import Memoryless, Policy
 from trdlab.rollouts.branches import Copying
-from trdlab.rollouts.episodes import AS_PAID, Counting, Episode, collect
-from trdlab.rollouts.playing import Policy
+from trdlab.rollouts.episodes import Episode, Recording
+from trdlab.rollouts.playing import Watch, unwatched
 from trdlab.runs.checkpoint import checkpoint_steps
 from trdlab.runs.folder import RunFolder
 from trdlab.tabular import exact
@@ -48,8 +50,7 @@ class Agent:
         estimator: what it expects.
         action_names: A names.
         make: makes the environments that it acts in.
-        policy: what the estimator describes, where that is not its own greedy policy.
-        counting: which rewards it counts, and what ends its future.
+        policy: who acts, where that is not the estimator's greedy policy.
         world: what it is the exact table of; None if it was learned.
         seconds_per_step: how long one of its steps takes as people play, if that is known.
         words: what names it on the command line, and what `make` makes if that is not its own.
@@ -62,33 +63,41 @@ class Agent:
     action_names: tuple[str, ...]
     make: Make
     policy: Policy | None = None
-    counting: Counting = AS_PAID
     world: World | None = None
     seconds_per_step: float | None = None
     words: tuple[str, ...] = ()
     place: tuple[str, ...] = ()
     copying: Copying = _OF_OTHERS
 
-    def play(self, count: int, *, seed: int, **how: Any) -> tuple[Episode, ...]:
-        """Returns episodes that the agent plays, each in an environment of its own.
+    @contextmanager
+    def begin(self, count: int = 1, *, seed: int, **how: Any) -> Iterator[Recording]:
+        """Begins episodes of the agent, to be played and paused as one likes, then closes them.
 
         Args:
-            count: of the episodes.
+            count: of the episodes, each in an environment of its own.
             seed: of the environments, and of the actions.
-            how: as for `collect`.
+            how: as for `Recording`.
         """
         environments = self.make(count, seed)
         try:
-            return collect(
-                self.estimator,
-                environments,
-                policy=self.policy,
-                counting=self.counting,
-                seed=seed,
-                **how,
-            )
+            yield Recording(self.estimator, environments, policy=self.policy, seed=seed, **how)
         finally:
             environments.close()
+
+    def play(
+        self, count: int, *, watch: Watch = unwatched, what: str = "episodes", **how: Any
+    ) -> tuple[Episode, ...]:
+        """Returns whole episodes that the agent plays, each in an environment of its own.
+
+        Args:
+            count: of the episodes.
+            watch: told how far they are, after every step.
+            what: they are called then.
+            how: as for `begin`.
+        """
+        with self.begin(count, **how) as recording:
+            recording.play(watch=watch, what=what)
+            return recording.episodes()
 
     def action(self, name: str) -> str:
         """Returns the name of an action that is given by its name or its number."""
@@ -160,7 +169,7 @@ def _exact_agent(
         estimator=table,
         action_names=model.world.action_names,
         make=place.make,
-        policy=lambda states: table.solution.policy[states],
+        policy=Memoryless(lambda states: table.solution.policy[states]),
         world=model.world,
         words=(called, *_axis_words(time_axis), *(() if env is None else place.words)),
         place=place.words,
@@ -219,7 +228,6 @@ def run_agent(
         estimator=estimator,
         action_names=names or tuple(f"action {i}" for i in range(told["num_actions"])),
         make=place.make,
-        counting=Counting(settings.clip_rewards, settings.life_loss_ends),
         seconds_per_step=told["frame_skip"] / per_second if per_second else None,
         words=(f"{path}{at}", *(() if env is None else place.words)),
         place=place.words,

@@ -5,9 +5,9 @@ from typing import Literal, get_args
 
 from trdlab.agents.agent import Agent
 from trdlab.errors import InputError, closest
-from trdlab.explanations.assessment import assess, moment_at, try_out
+from trdlab.explanations.assessment import assess, moment_of_play, try_out_in_play
 from trdlab.explanations.calibration.report import TrustReport
-from trdlab.explanations.episode.played import play
+from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import Story, tell
 from trdlab.explanations.moment.explanation import Explanation, explain
 from trdlab.explanations.moment.limits import judged
@@ -109,23 +109,30 @@ def explain_agent(
     """
     wanted = parts or PARTS
     limit = _limit(agent, step, max_steps)
-    moment = None
-    if any(FIELDS[part] for part in wanted):
-        moment = moment_at(agent, seed=seed, step=step)
-    pair = (None, None) if moment is None else _pair(agent, moment, action, foil)
-    if "contrast" in parts and pair[1] is None:
-        raise InputError("There is no other action to contrast it with.", "Ask for --what forecast")
     count = (50 if agent.world is None else 300) if episodes is None else episodes
     if "calibration" in parts and count == 0:
-        raise InputError("A calibration needs episodes.", "Ask for --episodes 50.")
-    report, trial = None, None
+        raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
+    copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
+    moment, pair, trial, story, report = None, (None, None), None, None, None
+    with agent.begin(seed=seed, max_steps=limit) as recording:
+        if any(FIELDS[part] for part in wanted):
+            recording.play_to(step)
+            moment = moment_of_play(agent, recording.playing)
+            pair = _pair(agent, moment, action, foil)
+        if "contrast" in parts and pair[1] is None:
+            raise InputError(
+                "There is no other action to contrast it with.", "Ask for `parts=forecast`."
+            )
+        if "contrast" in wanted and pair[0] is not None and pair[1] is not None:
+            trial = try_out_in_play(agent, recording.playing, *pair, seed=seed)
+        if "episode" in wanted:
+            recording.play()
+            (episode,) = recording.episodes()
+            story = tell(Played(episode, agent.action_names, agent.seconds_per_step))
     if count:
-        copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
         report = assess(agent, episodes=count, max_steps=limit, copying=copying, watch=watch)
     if moment is not None and report is not None:
         moment = judged(moment, report)
-    if "contrast" in wanted and pair[0] is not None and pair[1] is not None:
-        trial = try_out(agent, pair[0], pair[1], seed=seed, step=step)
     return Explained(
         agent=agent,
         parts=parts,
@@ -134,7 +141,7 @@ def explain_agent(
         explanation=None if moment is None else explain(moment, *pair),
         report=report,
         trial=trial,
-        story=tell(play(agent, seed, max_steps=limit)) if "episode" in wanted else None,
+        story=story,
         max_steps=limit,
     )
 
@@ -145,7 +152,7 @@ def _limit(agent: Agent, step: int, max_steps: int | None) -> int:
         return max(usual_limit(agent.estimator.time_axis), step + 1)
     if step >= max_steps:
         raise InputError(
-            f"There is no step {step} in {max_steps} steps.", "Choose another --max-steps."
+            f"There is no step {step} in {max_steps} steps.", "Choose another `max_steps`."
         )
     return max_steps
 

@@ -139,7 +139,7 @@ def to_dict(report: Report) -> dict[str, Any]:
         "schema": report.scene.schema,
         **report.scene.world,
         "time_axis": {**asdict(report.table.time_axis), "labels": report.table.time_axis.labels},
-        "future": asdict(moment.future),
+        "future": moment.future.to_dict(),
         "state": {"index": report.state, **report.scene.state},
         "actions": actions_to_dict(moment),
         "action": explanation.action,

@@ -24,6 +24,7 @@ from trdlab.explanations.calibration.faults import (
     discount_exponent,
 )
 from trdlab.gridworld import Gridworld, load_map
+from trdlab.policies import Memoryless
 from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import pool
 from trdlab.tabular import MDP, exact, learn
@@ -110,7 +111,7 @@ def test_a_reward_shifted_by_one_step_is_named(name: str, seed: int):
     episodes = collect(
         Given(components, SINGLE, GREEDY),
         ModelEnvironments(world(name), 200, seed=seed, time_limit=100),
-        policy=lambda states: policy[states],
+        policy=Memoryless(lambda states: policy[states]),
         seed=seed,
     )
     (fault,) = diagnosed(episodes)

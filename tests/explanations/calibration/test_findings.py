@@ -27,6 +27,7 @@ from trdlab.explanations.calibration.trust import trust
 from trdlab.explanations.calibration.verdicts import TrustFinding
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.intervals import Estimates
+from trdlab.policies import Memoryless
 from trdlab.rollouts.branches import Branching
 from trdlab.rollouts.episodes import collect
 from trdlab.show.plots.calibration import plot_trust
@@ -223,7 +224,7 @@ def test_the_first_sentence_says_how_far_and_the_second_why_no_further():
     components[..., 8:] = np.random.default_rng(0).normal(size=components[..., 8:].shape)
     worse = replace(table, decomposition=RewardDecomposition(components, axis))
     play = ModelEnvironments(mdp, 40, seed=0, time_limit=60)
-    episodes = collect(worse, play, policy=lambda states: table.solution.policy[states])
+    episodes = collect(worse, play, policy=Memoryless(lambda states: table.solution.policy[states]))
     assert trust_sentences(judge(table.future, episodes))[:2] == [
         "The forecast can be trusted to t+7.",
         "From t+8 on it is no better than a constant guess.",

@@ -1,6 +1,6 @@
 """The explanation: findings about a moment, ready to be rendered as text, picture or JSON."""
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 from trdlab.explanations.claims import Finding
 from trdlab.explanations.moment.contrast import contrast
@@ -64,7 +64,7 @@ def explain(moment: Moment, action: str | None = None, foil: str | None = None) 
         flips=() if foil is None else what_would_flip(moment, action, foil),
         forecast=forecast(moment, action),
         limits=limits(moment),
-        context=(WhoseFuture(*astuple(moment.future)), *ties, *later),
+        context=(WhoseFuture(**moment.future.to_dict()), *ties, *later),
     )
 
 
@@ -76,7 +76,8 @@ class WhoseFuture(Finding):
     ending: str
 
     def holds(self, moment: Moment) -> bool:
-        return (self.policy, self.reward, self.ending) == astuple(moment.future)
+        told = {"policy": self.policy, "reward": self.reward, "ending": self.ending}
+        return told == moment.future.to_dict()
 
 
 class TiedActions(Finding):

@@ -20,12 +20,12 @@ from matplotlib import pyplot as plt
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explain import Agent, ModelEnvironments, assess, explain
+from trdlab.explain import Agent, assess, explain
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.show.sentences import sentence
 from trdlab.show.trust import plot_trust
 from trdlab.show.verdicts import trust_sentences
-from trdlab.tabular import exact
+from trdlab.tabular import ModelEnvironments, exact
 
 from exercise import check
 

@@ -10,7 +10,7 @@ from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.explain import find_agent, gridworld_agent
 from trdlab.explain.agents import tabular_agent
-from trdlab.explain.copies import ModelEnvironments
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 4)
 

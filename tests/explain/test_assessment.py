@@ -8,20 +8,19 @@ import numpy as np
 import pytest
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.environments import Environments
+from trdlab.environments import Environments, GymEnvironments
 from trdlab.errors import InputError
 from trdlab.explain import (
     Agent,
-    CopyableGymEnvironments,
     Copying,
     assess,
     collect,
     explain,
     gridworld_agent,
 )
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.show import check, sentences
 from trdlab.tabular import MDP, ExactTable, exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 4)
 
@@ -119,7 +118,7 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
 
     def make(num_envs: int, seed: int) -> Environments:
         made = {"copyable": copyable}
-        return CopyableGymEnvironments("Once-v0", num_envs, seed=seed, env_arguments=made)
+        return GymEnvironments("Once-v0", num_envs, seed=seed, env_arguments=made)
 
     agent = Agent("once", drone.estimator, ("wait", "take"), make)
     report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))

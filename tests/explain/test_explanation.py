@@ -12,7 +12,6 @@ from trdlab.estimator import Future
 from trdlab.explain import chances, contrast, explain_agent, flips, forecast, leads, rhythm, worth
 from trdlab.explain.agents import gridworld_agent
 from trdlab.explain.contrast import in_short
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import collect
 from trdlab.explain.explanation import (
     Explanation,
@@ -30,6 +29,7 @@ from trdlab.explain.trust.trusted import Trust
 from trdlab.gridworld import Gridworld, load_map, parse_map
 from trdlab.show import check, sentences
 from trdlab.tabular import exact, learn
+from trdlab.tabular.episodes import ModelEnvironments
 
 GAMMA = 0.95
 F = TypeVar("F", bound=Finding)

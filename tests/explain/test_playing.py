@@ -8,9 +8,9 @@ import pytest
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.explain import Agent, assess, collect, gridworld_agent, play
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.playing import Progress, usual_limit
 from trdlab.explain.trust.followed import what_followed
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.9, 2, 2)
 

@@ -1,7 +1,8 @@
 """Gymnasium environments, stepped one after the other."""
 
 from collections.abc import Mapping
-from typing import Any
+from copy import copy, deepcopy
+from typing import Any, Self
 
 import gymnasium as gym
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from trdlab.arrays import IntArray
 from trdlab.environments.history import Histories, checked_actions
 from trdlab.environments.making import make_environment
-from trdlab.environments.protocol import Frames, Padding, Step
+from trdlab.environments.protocol import Frames, NotCopyable, Padding, Step
 from trdlab.errors import InputError
 
 _CHANNELS = (1, 3, 4)
@@ -109,6 +110,25 @@ class GymEnvironments:
                 self._act(env, action, step)
         self._histories.verify(state, self.env_id)
         return step.following
+
+    def branch(self, which: IntArray, seed: int) -> Self:
+        """Returns copies of the environments `which [B′]`; their `state_dict` cannot be asked for.
+
+        Raises:
+            NotCopyable: an environment cannot be copied.
+        """
+        other, seeds = copy(self), np.random.SeedSequence(seed).spawn(len(which))
+        try:
+            envs = [deepcopy(self._envs[env]) for env in which]
+        except (TypeError, AttributeError, NotImplementedError, RuntimeError) as error:
+            raise NotCopyable(
+                f"{self.env_id} cannot be copied ({error}).", "Ask for no ceiling and no foils."
+            ) from error
+        for env, words in zip(envs, seeds, strict=True):
+            env.unwrapped.np_random = np.random.default_rng(words)
+        other._envs, other.num_envs = envs, len(envs)
+        other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
+        return other
 
     def close(self) -> None:
         """Closes the environments."""

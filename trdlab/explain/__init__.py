@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from trdlab.explain.branches import Branches, Branching, Copying
     from trdlab.explain.comparison.pair import compare, find_pair
     from trdlab.explain.comparison.report import Comparison
-    from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
     from trdlab.explain.counterfactual import Counterfactual
     from trdlab.explain.episodes import Counting, Episode, collect
     from trdlab.explain.explained import Explained, explain_agent
@@ -39,7 +38,6 @@ __all__ = [
     "Calibration",
     "Ceiling",
     "Comparison",
-    "CopyableGymEnvironments",
     "Copying",
     "Counterfactual",
     "Counting",
@@ -47,7 +45,6 @@ __all__ = [
     "Explained",
     "Explanation",
     "Finding",
-    "ModelEnvironments",
     "Moment",
     "Played",
     "Revision",
@@ -95,8 +92,6 @@ _HOMES = {
     "Calibration": "trust.calibration",
     "calibrate": "trust.calibration",
     "Ceiling": "trust.ceiling",
-    "CopyableGymEnvironments": "copies",
-    "ModelEnvironments": "copies",
     "Counterfactual": "counterfactual",
     "play_to": "playing",
     "Counting": "episodes",

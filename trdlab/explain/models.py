@@ -9,13 +9,13 @@ from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.arguments import parse_arguments, say_arguments
 from trdlab.errors import InputError, closest
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.moment import Moment
 from trdlab.explain.tabular import gamma_what_ifs, gridworld_moment, tabular_moment
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs.folder import is_run
 from trdlab.tabular import ExactTable
+from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.reach import reachable
 from trdlab.tabular.toytext import make_world

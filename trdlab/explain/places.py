@@ -7,9 +7,9 @@ from typing import Any
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
+from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.stack import observation_space
 from trdlab.errors import InputError
-from trdlab.explain.copies import CopyableGymEnvironments
 from trdlab.explain.models import World, find_model, is_model
 
 Make = Callable[[int, int], Environments]
@@ -47,7 +47,7 @@ def find_place(env: str, env_arguments: Sequence[str], time_axis: TimeAxis) -> P
     if not is_model(env):
         arguments = parse_arguments(env_arguments)
         return Place(
-            lambda num_envs, seed: CopyableGymEnvironments(
+            lambda num_envs, seed: GymEnvironments(
                 env, num_envs, seed=seed, env_arguments=arguments
             ),
             words,

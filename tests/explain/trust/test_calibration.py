@@ -14,7 +14,6 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Step
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Counting, Episode, collect
 from trdlab.explain.trust.blame import blame, is_off
 from trdlab.explain.trust.calibration import calibrate, endings
@@ -23,6 +22,7 @@ from trdlab.explain.trust.hidden import exact_tails, hidden, sufficient_horizon
 from trdlab.explain.trust.trusted import trust
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import ExactTable, exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 20)
 

@@ -10,11 +10,11 @@ import pytest
 from by_hand import occupancy
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.environments import GymEnvironments
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explain.branches import Branching
-from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
 from trdlab.explain.counterfactual import counterfactual
 from trdlab.explain.episodes import collect
 from trdlab.explain.playing import play_to
@@ -23,6 +23,7 @@ from trdlab.explain.trust.ceiling import ceiling, exact_ceiling
 from trdlab.explain.trust.intervals import Estimates
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import ExactTable, exact, from_environment
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 12)
 DRONE = Gridworld(load_map("drone").with_slip(0.2))
@@ -89,20 +90,20 @@ def test_where_a_coin_decides_the_ceiling_is_zero():
 def test_gymnasium_environments_are_copied_with_fresh_chance():
     lake = from_environment(gym.make("FrozenLake-v1"))
     table = exact(lake, TimeAxis(0.95, 3))
-    environments = CopyableGymEnvironments("FrozenLake-v1", 2, seed=0)
+    environments = GymEnvironments("FrozenLake-v1", 2, seed=0)
     environments.reset()
     copies = environments.branch(np.zeros(60, dtype=np.int64), seed=1)
     reached = copies.step(np.full(60, 2)).frames
     assert set(reached.tolist()) == {0, 1, 4}  # right, slipping up or down
     assert environments.step(np.array([2, 2])).frames.shape == (2,)  # those stay as they were
     branches = Branching(table, copies=3).along(
-        CopyableGymEnvironments("FrozenLake-v1", 12, seed=0), every=10
+        GymEnvironments("FrozenLake-v1", 12, seed=0), every=10
     )
     assert not ceiling(branches, resamples=50).deterministic
 
 
 def test_without_chance_the_ceiling_says_so():
-    cart = CopyableGymEnvironments("CartPole-v1", 12, seed=0)
+    cart = GymEnvironments("CartPole-v1", 12, seed=0)
 
     class Sway:
         time_axis, future = TimeAxis(0.9, 5), Future("the greedy policy")

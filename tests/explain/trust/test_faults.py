@@ -13,7 +13,6 @@ from trdlab.bellman import target
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import Episode, collect
 from trdlab.explain.trust.audit import Audit, audit
 from trdlab.explain.trust.blame import blame
@@ -28,6 +27,7 @@ from trdlab.explain.trust.faults import (
 from trdlab.explain.trust.followed import pool
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import MDP, exact, learn
+from trdlab.tabular.episodes import ModelEnvironments
 
 SINGLE, PAIRS = TimeAxis(0.95, 12), TimeAxis(0.95, 6, 2)
 GREEDY = Future("the greedy policy")

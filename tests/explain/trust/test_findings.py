@@ -14,7 +14,6 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explain.branches import Branching
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explain.episodes import collect
 from trdlab.explain.trust.audit import Audit
 from trdlab.explain.trust.blame import Blame
@@ -33,6 +32,7 @@ from trdlab.show.trust import plot_trust
 from trdlab.show.verdicts import TEMPLATES, check_trust, trust_sentences
 from trdlab.statistics import Estimate
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 WORDS = {
     "can be": "cannot be",

@@ -1,18 +1,17 @@
-"""Environments whose states can be copied, to see what else could have followed."""
+"""Episodes drawn from an exact model."""
 
 from collections.abc import Mapping
-from copy import copy, deepcopy
+from copy import copy
 from typing import Any, Self
 
 import gymnasium as gym
 import numpy as np
 
 from trdlab.arrays import FloatArray, IntArray
-from trdlab.environments import NotCopyable, Padding, Step
-from trdlab.environments.gym import GymEnvironments
-from trdlab.environments.history import Histories, checked_actions
+from trdlab.environments.history import checked_actions
+from trdlab.environments.protocol import Padding, Step
 from trdlab.errors import InputError
-from trdlab.tabular import MDP
+from trdlab.tabular.mdp import MDP
 
 
 class ModelEnvironments:
@@ -129,30 +128,3 @@ class ModelEnvironments:
         drawn = np.searchsorted(self._cumulative, level, side="right")
         first, last = self.mdp.offsets[rows], self.mdp.offsets[rows + 1] - 1
         return np.asarray(np.clip(drawn, first, last))  # rounding must not lead into another row
-
-
-class CopyableGymEnvironments(GymEnvironments):
-    """Gymnasium environments that are copied whole, with fresh chance in each copy.
-
-    The copies take their chance from `np_random`, as Gymnasium asks of environments. One whose
-    chance comes from elsewhere makes copies that all do the same (see `Ceiling.deterministic`).
-    """
-
-    def branch(self, which: IntArray, seed: int) -> Self:
-        """Returns copies of the environments `which [B′]`; their `state_dict` cannot be asked for.
-
-        Raises:
-            NotCopyable: an environment cannot be copied.
-        """
-        other, seeds = copy(self), np.random.SeedSequence(seed).spawn(len(which))
-        try:
-            envs = [deepcopy(self._envs[env]) for env in which]
-        except (TypeError, AttributeError, NotImplementedError, RuntimeError) as error:
-            raise NotCopyable(
-                f"{self.env_id} cannot be copied ({error}).", "Ask for no ceiling and no foils."
-            ) from error
-        for env, words in zip(envs, seeds, strict=True):
-            env.unwrapped.np_random = np.random.default_rng(words)
-        other._envs, other.num_envs = envs, len(envs)
-        other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
-        return other

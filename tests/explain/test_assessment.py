@@ -1,5 +1,6 @@
 """Agents: named, played, and judged by what came."""
 
+import random
 from dataclasses import replace
 from pathlib import Path
 
@@ -90,17 +91,17 @@ def test_what_is_wrong_from_some_step_on_is_marked_in_every_explanation():
 
 
 class Once(gym.Env):
-    """An environment of one step that pays 1; copies of it can be forbidden."""
+    """An environment of one step that pays 1; it can have neither copies nor a second time."""
 
-    observation_space = gym.spaces.Discrete(1)
-    action_space = gym.spaces.Discrete(2)
+    observation_space = gym.spaces.Discrete(12)
+    action_space = gym.spaces.Discrete(4)
 
     def __init__(self, copyable: bool = True) -> None:
         self.copyable = copyable
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        return 0, {}
+        return 0 if self.copyable else random.SystemRandom().randrange(12), {}
 
     def step(self, action):
         return 0, 1.0, True, False, {}

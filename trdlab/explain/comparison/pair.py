@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from trdlab.environments.naming import is_numbered
 from trdlab.errors import InputError
 from trdlab.explain.agents import AXIS, Agent, find_agent
 from trdlab.explain.assessment import assess
@@ -153,8 +154,3 @@ def _doable(agent: Agent, pair: tuple[Agent, Agent]) -> str:
     named = all(not is_numbered(of.action_names) for of in pair)
     count = len(agent.action_names)
     return f"the actions {', '.join(agent.action_names)}" if named else f"{count} actions"
-
-
-def is_numbered(action_names: Sequence[str]) -> bool:
-    """Returns whether actions have numbers for names."""
-    return all(name == f"action {i}" for i, name in enumerate(action_names))

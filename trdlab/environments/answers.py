@@ -44,8 +44,9 @@ def observation_of(env: Any, seed: int, name: str) -> Any:
     """
     answer = env.reset(seed=seed)
     if not isinstance(answer, tuple) or len(answer) != 2:
+        found = "nothing" if answer is None else f"one {type(answer).__name__}"
         raise InputError(
-            f"{name}.reset() returns one {type(answer).__name__}.",
+            f"{name}.reset() returns {found}.",
             "Return observation, info, as Gymnasium asks since 0.26.",
         )
     return answer[0]

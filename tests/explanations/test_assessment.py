@@ -1,5 +1,6 @@
 """Agents: named, played, and judged by what came."""
 
+import random
 from dataclasses import replace
 from pathlib import Path
 
@@ -84,17 +85,17 @@ def test_what_is_wrong_from_some_step_on_is_marked_in_every_explanation():
 
 
 class Once(gym.Env):
-    """An environment of one step that pays 1; copies of it can be forbidden."""
+    """An environment of one step that pays 1; it can have neither copies nor a second time."""
 
-    observation_space = gym.spaces.Discrete(1)
-    action_space = gym.spaces.Discrete(2)
+    observation_space = gym.spaces.Discrete(12)
+    action_space = gym.spaces.Discrete(4)
 
     def __init__(self, copyable: bool = True) -> None:
         self.copyable = copyable
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        return 0, {}
+        return 0 if self.copyable else random.SystemRandom().randrange(12), {}
 
     def step(self, action):
         return 0, 1.0, True, False, {}
@@ -114,9 +115,10 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
         made = {"copyable": copyable}
         return GymEnvironments("Once-v0", num_envs, seed=seed, env_arguments=made)
 
-    agent = Agent("once", drone.estimator, ("wait", "take"), make)
+    agent = Agent("once", drone.estimator, ("wait", "take", "a", "b"), make)
     report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
-    assert (report.ceiling is not None) == copyable
+    assert (report.ceiling is not None) == (report.foils is not None) == copyable
+    assert report.lost == "" if copyable else "Once-v0 cannot be copied: " in report.lost
 
 
 @pytest.mark.parametrize("seed", range(4))

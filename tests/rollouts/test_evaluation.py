@@ -35,7 +35,7 @@ class Scripted:
         self.steps = np.zeros(self.num_envs, dtype=np.int64)
         return self.steps[:, None].astype(np.float32)
 
-    def step(self, actions: np.ndarray) -> Step:
+    def step(self, actions: np.ndarray, active: np.ndarray | None = None) -> Step:
         pays = np.array([story[at] for story, at in zip(self.stories, self.steps, strict=True)])
         self.steps += 1
         frames = self.steps[:, None].astype(np.float32)

@@ -9,6 +9,7 @@ from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.gym import GymEnvironments
+from trdlab.environments.naming import is_numbered
 from trdlab.environments.stack import observation_space
 from trdlab.errors import InputError
 
@@ -82,7 +83,8 @@ def check_fits(place: Place, world: World) -> None:
     """
     environments = place.make(1, 0)
     try:
-        names = environments.action_names or world.action_names
+        told = environments.action_names
+        names = world.action_names if is_numbered(told) else told
         found = seen(environments), environments.num_actions, names
     finally:
         environments.close()

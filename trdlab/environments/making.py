@@ -15,7 +15,6 @@ from trdlab.errors import InputError, TrdlabError, closest
 # By its name, as Gymnasium finds entry points: what registers our maps stands above this layer.
 _REGISTERED_BY = {"trdlab": "trdlab.envs", "ALE": "ale_py"}
 _EXTRAS = {"box2d": "trdlab[box2d]"}
-_WRONG_VALUE = (TypeError, ValueError, LookupError, AssertionError, AttributeError)
 _LISTED = 'python -c "import gymnasium; gymnasium.pprint_registry()" lists those that there are.'
 
 
@@ -56,7 +55,7 @@ def make_environment(
         raise InputError(
             f"{env_id} cannot be imported: {error}.", "Install what it needs, or check the id."
         ) from error
-    except (*_WRONG_VALUE, OSError, gym.error.Error) as error:
+    except Exception as error:  # whatever can be raised in another's code
         made = f" with {say_arguments(given)}" if given else ""
         reason = str(error).partition(" was raised from the environment creator")[0]
         raise InputError(

@@ -175,7 +175,7 @@ class Playing:
 
     def take(self, actions: IntArray) -> Step:
         """Takes a step with these actions `[B]`; where an episode has ended they do not count."""
-        step = self.environments.step(actions)
+        step = self.environments.step(actions, active=self.running)
         self.steps += 1
         over = step.ended | (self.steps == self.max_steps)  # [B]
         self.finished, self.running = self.running & over, self.running & ~over

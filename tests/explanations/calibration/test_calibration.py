@@ -145,7 +145,7 @@ class Scripted:
         self.now = 5
         return np.array([[5]])
 
-    def step(self, actions: Any) -> Step:
+    def step(self, actions: Any, active: Any = None) -> Step:
         self.now += 1
         over = np.array([self.now == 9])
         frames = np.array([[self.now]])

@@ -22,7 +22,15 @@ from trdlab.errors import InputError, OutputError, TrdlabError, closest
 from trdlab.files import write_whole
 from trdlab.runs.folder import RunFolder
 from trdlab.runs.index import Index, Sum, check_names, read_whole
-from trdlab.runs.keeping import Saved, all_saved, blocks_before, forget, new_folder, sweep
+from trdlab.runs.keeping import (
+    Saved,
+    all_saved,
+    announce,
+    blocks_before,
+    forget,
+    new_folder,
+    sweep,
+)
 from trdlab.runs.state import Arrays, pack, unpack
 
 STATE, TENSORS = "state.json", ".safetensors"
@@ -75,9 +83,10 @@ def save_checkpoint(
     try:
         sweep(run)  # makes room before room is needed
         folder, there = new_folder(run, step), blocks_before(run, step)
-        for name, file in index.block_files.items():
-            if file not in there:
-                write_whole(run.replay / file, partial(Path.write_bytes, data=blocks[name]))
+        new = {name: file for name, file in index.block_files.items() if file not in there}
+        announce(run, folder, {name: index.blocks[name] for name in new})
+        for name, file in new.items():
+            write_whole(run.replay / file, partial(Path.write_bytes, data=blocks[name]))
         write_whole(folder, lambda temporary: _write(temporary, tree, arrays, index.blocks))
     except (OutputError, OSError) as error:
         with suppress(OSError):  # the first failure is the one to tell

@@ -4,8 +4,8 @@ import json
 import platform
 import shlex
 import sys
-from collections.abc import Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from trdlab.errors import InputError, OutputError, TrdlabError, closest
-from trdlab.files import read_json, write_whole
+from trdlab.files import check_own, read_json, write_whole
 from trdlab.runs.config import Config, read_config, to_toml
 from trdlab.runs.lock import hold
 
@@ -117,9 +117,27 @@ class RunFolder:
         """The folder with the results of evaluations."""
         return self.path / "evaluations"
 
-    def held(self) -> AbstractContextManager[None]:
-        """Holds the run for this process alone, see `trdlab.runs.lock.hold`."""
-        return hold(self.path)
+    @property
+    def tensorboard(self) -> Path:
+        """The folder with the metrics for TensorBoard."""
+        return self.path / "tensorboard"
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Holds the run for this process alone, to write to it (see `trdlab.runs.lock.hold`).
+
+        Raises:
+            TrdlabError: another process holds it.
+            OutputError: it cannot be written; or a part of it is a link, behind which nothing is
+                ever written, cut or deleted.
+        """
+        parts = (self.metrics, self.checkpoints, self.replay, self.evaluations, self.tensorboard)
+        for part in parts:
+            check_own(part)
+        for checkpoint in self.checkpoints.glob("*"):
+            check_own(checkpoint)
+        with hold(self.path):
+            yield
 
 
 def new_manifest() -> dict[str, Any]:

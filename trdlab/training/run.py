@@ -134,8 +134,7 @@ def carry_on(
     if trainer.done:  # and saved
         return True
     saved, since = -1, time.perf_counter()
-    files = run.folder.path / "tensorboard"
-    with board(files, trainer.agent_steps, wanted=settings.tensorboard) as shown:
+    with board(run.folder.tensorboard, trainer.agent_steps, wanted=settings.tensorboard) as shown:
         while not trainer.done and not should_stop():
             before = trainer.agent_steps
             trainer.step()

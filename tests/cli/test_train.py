@@ -280,7 +280,8 @@ def test_the_list_of_runs(trdlab, trained, tmp_path):
     assert header == "run environment N w steps score status"
     assert any(re.fullmatch(r"pole CartPole-v1 2 1 120 [\d.]+ done", row) for row in rows)
     assert any(row.startswith("torn ") for row in rows)
-    assert any(row.startswith("edited Its config.toml has") for row in rows)
+    assert any(row.startswith("edited ") for row in rows)
+    assert "env = 'X', and the run began with" in " ".join(rows)
     assert "no run" not in out
     code, out, _ = trdlab("runs", tmp_path / "nowhere")
     assert (code, out) == (0, f"There are no runs in '{tmp_path / 'nowhere'}'.\n")

@@ -54,7 +54,8 @@ class RunFolder:
             OutputError: there is something already, or it cannot be written.
         """
         config_text = to_toml(config)
-        manifest_text = json.dumps({**new_manifest(), **(manifest_extra or {})}, indent=1)
+        manifest = {**new_manifest(), **(manifest_extra or {}), "config": config}
+        manifest_text = json.dumps(manifest, indent=1)
         check_free(path)
 
         def write(folder: Path) -> None:
@@ -82,7 +83,7 @@ class RunFolder:
         """Reads a run's configuration and manifest.
 
         Raises:
-            InputError: there is no run here.
+            InputError: there is no run here, or its configuration was changed since it began.
             TrdlabError: it is torn, or was written by a version whose format is another.
         """
         if not is_run(path):
@@ -93,9 +94,11 @@ class RunFolder:
         try:
             manifest = read_json(path / MANIFEST)
             _check_format(path, manifest)
-            return cls(path, read_config(path / CONFIG), manifest)
+            config = read_config(path / CONFIG)
         except InputError as error:  # the file is the run's, not the user's
             raise TrdlabError(error.cause, "Put it right, or begin another run.") from error
+        _check_unchanged(path, config, manifest)
+        return cls(path, config, manifest)
 
     @property
     def metrics(self) -> Path:
@@ -198,6 +201,21 @@ def _check_format(path: Path, manifest: Any) -> None:
             f"The run '{path}' has format {written}, written by trdlab {author}; "
             f"this is trdlab {_version('trdlab')}, which reads format {FORMAT}.",
             f"Use trdlab {author}{' or newer' if written > FORMAT else ''}.",
+        )
+
+
+def _check_unchanged(path: Path, now: dict[str, Any], manifest: dict[str, Any]) -> None:
+    """Refuses a run that was told something else than its configuration says now."""
+    then = manifest.get("config")
+    if not isinstance(then, dict):
+        raise TrdlabError(f"'{path / MANIFEST}' is torn: it does not say what the run was told.")
+    changed = [key for key in then | now if then.get(key) != now.get(key)]
+    if changed:
+        key = changed[0]
+        said, was = (repr(of[key]) if key in of else "nothing" for of in (now, then))
+        raise InputError(
+            f"'{path / CONFIG}' says {key} = {said}, and the run began with {was}.",
+            "Put it back, or begin another run with that file.",
         )
 
 

@@ -174,8 +174,7 @@ def _restore(
         The length of the metrics then, the seconds of training, and what could not be restored.
     """
     checkpoint = load_checkpoint(folder, step)
-    state: dict[str, Any] = checkpoint.state
-    _check_unchanged(state["settings"], trainer.settings.to_config(), checkpoint.step)
+    state = checkpoint.state
     state["learner"]["q_network"] = state.pop("q_network")
     state["memory"]["frames"]["sealed"] = checkpoint.blocks
     problem = trainer.load_state_dict(state)
@@ -204,14 +203,3 @@ def _check_same_weights(folder: RunFolder, given: dict[str, Any]) -> None:
 
 def _passes(before: int, after: int, every: int) -> bool:
     return after // every > before // every
-
-
-def _check_unchanged(then: dict[str, Any], now: dict[str, Any], step: int) -> None:
-    changed = [key for key in then | now if then.get(key) != now.get(key)]
-    if changed:
-        key = changed[0]
-        raise InputError(
-            f"The configuration says {key} = {now.get(key)!r}, and the checkpoint at {step} agent "
-            f"steps was made with {then.get(key)!r}.",
-            "Put it back, or begin another run with it: trdlab train --config.",
-        )

@@ -16,7 +16,7 @@ from gymnasium.wrappers import FrameStackObservation
 import trdlab
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
-from trdlab.errors import InputError
+from trdlab.errors import InputError, NotImported
 from trdlab.estimator import Estimator, Future
 from trdlab.explanations import explain, moment_of
 from trdlab.explanations.moment.sentences import check, sentences
@@ -161,7 +161,7 @@ def test_a_run_can_be_moved_and_needs_no_environment(drone, tmp_path):
     np.testing.assert_array_equal(
         load(moved).decompose([0]).components, load(drone).decompose([0]).components
     )
-    with pytest.raises(InputError, match=r"gone:Gone-v0 cannot be imported"):
+    with pytest.raises(NotImported, match=r"module 'gone'\. If you trust it, import gone first\."):
         evaluate_run(moved)
 
 

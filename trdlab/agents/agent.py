@@ -17,6 +17,7 @@ from trdlab.agents.models import (
 from trdlab.agents.places import Make, Place, check_fits, find_place, refuse_arguments
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
+from trdlab.environments.making import check_imported
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.gridworld import map_names
@@ -214,6 +215,8 @@ def run_agent(
     names = tuple(told["action_names"])
     at = "" if step is None else f"@{step}"
     per_second = told["frames_per_second"]
+    module = settings.env.rpartition(":")[0]
+    needed = ("--import", module) if module and env is None else ()
     return Agent(
         name=f"{folder.path.name}{at}",
         estimator=estimator,
@@ -221,7 +224,7 @@ def run_agent(
         make=place.make,
         counting=Counting(settings.clip_rewards, settings.life_loss_ends),
         seconds_per_step=told["frame_skip"] / per_second if per_second else None,
-        words=(f"{path}{at}", *(() if env is None else place.words)),
+        words=(f"{path}{at}", *needed, *(() if env is None else place.words)),
         place=place.words,
         copying=_OF_GAMES if _is_atari(settings, env) else _OF_OTHERS,
     )
@@ -235,6 +238,8 @@ def _place(settings: "TrainSettings", env: str | None, env_arguments: Sequence[s
     """Returns where the agent of a run acts: where it was trained, or in another environment."""
     from trdlab.training.setup import make_environments
 
+    if env is None:
+        check_imported(settings.env)
     own = (settings.env, settings.env_arg) if env is None else (env, tuple(env_arguments))
     place = find_place(*own, settings.time_axis)
     if not _is_atari(settings, env):

@@ -92,7 +92,12 @@ def train_atari(
     _train("atari", game, preset, config, out, dry_run, given or {})
 
 
-def resume(run: RunPath, checkpoint: Checkpoint = None, verbose: common.Verbose = False) -> None:
+def resume(
+    run: RunPath,
+    checkpoint: Checkpoint = None,
+    modules: common.Import = None,
+    verbose: common.Verbose = False,
+) -> None:
     """Go on with a run that was stopped, exactly as if it had not been."""
     from trdlab.training.run import resume as pick_up
 
@@ -117,6 +122,7 @@ def evaluate(
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")] = 1000,
     checkpoint: Checkpoint = None,
+    modules: common.Import = None,
     as_json: common.AsJson = False,
     verbose: common.Verbose = False,
 ) -> None:
@@ -202,8 +208,6 @@ def _train(
 
 def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
     """Trains a run to its end or to the next signal, and evaluates it at the end."""
-    from shlex import quote
-
     from trdlab.cli.progress import TrainingProgress, stopping
     from trdlab.deep.memory import available_memory
     from trdlab.show.training import duration, memory_line
@@ -226,7 +230,7 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
         steps = run.trainer.agent_steps
         if not done:
             _say(errors, f"Stopped and saved at {steps:,} agent steps.")
-            _say(errors, f"Go on: trdlab resume {quote(str(path))}")
+            _say(errors, f"Go on: {run.folder.resume_command}")
             raise typer.Exit(stop.code or 0)
     _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
     if settings.evaluate_episodes:

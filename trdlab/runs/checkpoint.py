@@ -7,7 +7,6 @@ changes, so that checkpoints can share it.
 """
 
 import json
-import shlex
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -195,7 +194,7 @@ def _chosen(run: RunFolder, step: int | None) -> Saved:
     saved = _by_step(run)
     if not saved:
         raise InputError(
-            f"The run '{run.path}' has no checkpoint yet.", f"Train on: {_resume(run)}."
+            f"The run '{run.path}' has no checkpoint yet.", f"Train on: {run.resume_command}."
         )
     if step is not None and step not in saved:
         raise InputError(
@@ -211,7 +210,7 @@ def _not_saved(run: RunFolder, step: int, error: OutputError | OSError) -> Outpu
     begin = f"step {steps[-1]}" if steps else "the beginning"
     return OutputError(
         f"The checkpoint at step {step} cannot be saved: {cause}",
-        f"When it can be written again, {_resume(run)} goes on from {begin}.",
+        f"When it can be written again, {run.resume_command} goes on from {begin}.",
     )
 
 
@@ -232,7 +231,3 @@ def _is_whole(run: RunFolder, saved: Saved) -> bool:
     except TrdlabError:
         return False
     return True
-
-
-def _resume(run: RunFolder) -> str:
-    return f"trdlab resume {shlex.quote(str(run.path))}"

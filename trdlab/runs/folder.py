@@ -125,6 +125,13 @@ class RunFolder:
         """The folder with the metrics for TensorBoard."""
         return self.path / "tensorboard"
 
+    @property
+    def resume_command(self) -> str:
+        """The command that goes on with it, with the module that its own environment needs."""
+        module = str(self.config.get("env", "")).rpartition(":")[0]
+        words = ["trdlab", "resume", str(self.path), *(("--import", module) if module else ())]
+        return shlex.join(words)
+
     @contextmanager
     def held(self) -> Iterator[None]:
         """Holds the run for this process alone, to write to it (see `trdlab.runs.lock.hold`).

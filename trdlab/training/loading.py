@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 
 from trdlab.deep.settings import TrainSettings
+from trdlab.environments.making import check_imported
 from trdlab.errors import TrdlabError
 from trdlab.files import write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate
@@ -82,11 +83,13 @@ def evaluate_run(
 
     Raises:
         InputError: there is no run, no such checkpoint, or the environments cannot be made.
+        NotImported: its environment needs a module that has not been imported.
         TrdlabError: something is torn.
     """
     folder = RunFolder.open(path)
     settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
     step = checkpoint_steps(folder)[-1] if step is None and checkpoint_steps(folder) else step
+    check_imported(settings.env)
     use_threads(settings)
     estimator = load(path, step)
     count = episodes or settings.evaluate_episodes or 30

@@ -13,6 +13,7 @@ from trdlab.deep.memory import check_memory
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
 from trdlab.deep.weights import read_weights
+from trdlab.environments.making import check_imported
 from trdlab.errors import InputError, TrdlabError
 from trdlab.runs import (
     MetricsFile,
@@ -92,10 +93,12 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
 
     Raises:
         InputError: there is no run, no such checkpoint, or its configuration has been changed.
+        NotImported: its environment needs a module that has not been imported.
         TrdlabError: another process holds it, or something is torn.
     """
     folder = RunFolder.open(path)
     settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
+    check_imported(settings.env)
     with ExitStack() as stack:
         stack.enter_context(folder.held())
         trainer, memory = _trainer(settings, stack)

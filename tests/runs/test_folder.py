@@ -256,7 +256,7 @@ def test_all_runs_are_listed_and_a_torn_one_says_so(tmp_path):
     for step in (1, 2000):
         save_checkpoint(run, step, {})
     first, second, third = list_runs(tmp_path)
-    assert "metrics.jsonl', line 2 of those read, is torn" in first.fault
+    assert "metrics.jsonl', the last line, is torn. Delete that line." in first.fault
     assert second.config == {"seed": 1}
     assert second.metrics == {"agent_steps": 4999, "loss": 0.5}
     assert (second.step, second.pid, second.fault) == (2000, None, None)

@@ -302,11 +302,27 @@ def test_a_changed_configuration_is_refused_by_all(trained, whole, trdlab):
     assert contents(trained) == before
 
 
-def test_metrics_that_were_cut_short_are_refused(trained, trdlab):
-    path = trained / "metrics.jsonl"
-    path.write_bytes(path.read_bytes()[:100])
-    refused(trdlab("resume", trained), 1, "has 100 bytes, and had")
-    assert len(path.read_bytes()) == 100
+def without(*lost: int) -> Callable[[Path], None]:
+    """Returns what deletes lines of metrics."""
+
+    def delete(path: Path) -> None:
+        lines = path.read_bytes().splitlines(keepends=True)
+        path.write_bytes(b"".join(line for at, line in enumerate(lines) if at not in lost))
+
+    return delete
+
+
+@pytest.mark.parametrize("harm", [Path.unlink, without(3), without(*range(8)), without(10, 11)])
+@pytest.mark.parametrize("step", [90, 120])
+def test_metrics_are_a_record_and_no_condition(trained, whole, harm, step):
+    harm(trained / "metrics.jsonl")
+    there = trained / "metrics.jsonl"
+    kept = {row["agent_steps"] for row in read_metrics(there)} if there.exists() else set()
+    finish(trained, step)
+    told = [row["agent_steps"] for row in read_metrics(there)]
+    assert told == [at for at in range(10, 121, 10) if at in kept or at > step]
+    there.write_bytes((whole / "metrics.jsonl").read_bytes())  # but for them, it is the same
+    assert result(trained) == result(whole)
 
 
 @pytest.mark.parametrize("failing", range(1, 30, 3))

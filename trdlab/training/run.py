@@ -61,7 +61,8 @@ class Run:
         state = self.trainer.state_dict()
         state["q_network"] = state["learner"].pop("q_network")  # so that it can be read alone
         blocks = state["memory"]["frames"].pop("sealed")
-        state["run"] = {"metrics_length": self.metrics.sync(), "seconds": self.seconds}
+        state["run"] = {"seconds": self.seconds}
+        self.metrics.sync()
         save_checkpoint(self.folder, self.trainer.agent_steps, state, blocks)
 
 
@@ -103,11 +104,11 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
         stack.enter_context(folder.held())
         trainer, memory = _trainer(settings, stack)
         if checkpoint_steps(folder) or step is not None:
-            length, seconds, problem = _restore(trainer, folder, step)
+            seconds, problem = _restore(trainer, folder, step)
         else:
             _check_same_weights(folder, _given_weights(trainer))
-            length, seconds, problem = 0, 0.0, None
-        metrics = stack.enter_context(MetricsFile(folder.metrics, length))
+            seconds, problem = 0.0, None
+        metrics = stack.enter_context(MetricsFile(folder.metrics, trainer.agent_steps))
         yield Run(folder, trainer, metrics, memory, seconds, problem)
 
 
@@ -170,18 +171,18 @@ def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
 
 def _restore(
     trainer: Trainer, folder: RunFolder, step: int | None
-) -> tuple[int, float, TrdlabError | None]:
+) -> tuple[float, TrdlabError | None]:
     """Puts a trainer where a checkpoint stands.
 
     Returns:
-        The length of the metrics then, the seconds of training, and what could not be restored.
+        The seconds of training until then, and what could not be restored.
     """
     checkpoint = load_checkpoint(folder, step)
     state = checkpoint.state
     state["learner"]["q_network"] = state.pop("q_network")
     state["memory"]["frames"]["sealed"] = checkpoint.blocks
     problem = trainer.load_state_dict(state)
-    return state["run"]["metrics_length"], state["run"]["seconds"], problem
+    return state["run"]["seconds"], problem
 
 
 def _given_weights(trainer: Trainer) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from hypothesis.extra import numpy as hnp
 
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_arrays, save_checkpoint
+from trdlab.runs.index import Index
 from trdlab.runs.state import DTYPES, pack, unpack
 
 
@@ -96,7 +97,8 @@ def test_arrays_in_any_memory_order_and_names_that_meet(run):
 def test_one_part_is_read_alone(run):
     save_checkpoint(run, 5, a_state(5))
     (run.checkpoints / "000000005" / "memory.safetensors").unlink()
-    weights = read_arrays(run, "q_network")
+    step, weights = read_arrays(run, "q_network")
+    assert step == 5
     assert list(weights) == ["bias", "head.weight"]
     assert weights["head.weight"].tolist() == [[5, 5]] * 3
     with pytest.raises(InputError, match=r"step 5 has no 'q_net'\. Did you mean 'q_network'\?"):
@@ -170,6 +172,24 @@ def test_a_run_without_a_checkpoint_says_so(run):
     save_checkpoint(run, 1, {})
     with pytest.raises(InputError, match=r"no checkpoint at step 3\. There are: 1\."):
         load_checkpoint(run, 3)
+
+
+def test_who_reads_the_newest_while_it_is_thinned_out_gets_a_newer_one(run, monkeypatch):
+    def overtaken(folder: Path) -> Index:
+        monkeypatch.undo()
+        newest = checkpoint_steps(run)[-1]
+        for step in (newest + 1, newest + 2):
+            save_checkpoint(run, step, a_state(step))
+        return Index.read(folder)  # which is gone
+
+    save_checkpoint(run, 1, a_state(1))
+    monkeypatch.setattr(Index, "read", overtaken)
+    assert load_checkpoint(run).step == 3
+    monkeypatch.setattr(Index, "read", overtaken)
+    assert read_arrays(run, "q_network")[0] == 5
+    monkeypatch.setattr(Index, "read", overtaken)
+    with pytest.raises(TrdlabError, match="The checkpoint at step 4 cannot be used"):
+        load_checkpoint(run, 4)
 
 
 # ---- what is torn ------------------------------------------------------------------------------

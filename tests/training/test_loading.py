@@ -14,6 +14,7 @@ import torch
 from gymnasium.wrappers import FrameStackObservation
 
 import trdlab
+from trdlab.cli import main
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError, NotImported
@@ -143,6 +144,25 @@ def test_an_evaluation_is_kept_with_what_it_was_made_with(drone):
     assert other != path
     kept = json.loads(other.read_text())
     assert [kept[key] for key in ("agent_steps", "episodes", "epsilon", "seed")] == [200, 3, 1, 4]
+
+
+@pytest.mark.parametrize("harm", ["a file", "a link", "nothing"])
+def test_an_evaluation_that_cannot_be_kept_is_told_all_the_same(drone, tmp_path, capsys, harm):
+    run, elsewhere = Path(shutil.copytree(drone, tmp_path / "run")), tmp_path / "elsewhere"
+    shutil.rmtree(run / "evaluations")
+    elsewhere.mkdir()
+    if harm == "a file":
+        (run / "evaluations").touch()
+    elif harm == "a link":
+        (run / "evaluations").symlink_to(elsewhere)
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", str(run)])
+    out, err = capsys.readouterr()
+    assert end.value.code == 0
+    assert "mean return" in out
+    assert err.startswith("Kept: " if harm == "nothing" else "Not kept: ")
+    assert "Not a directory." in err or "is a link" in err or harm == "nothing"
+    assert not list(elsewhere.iterdir())
 
 
 def test_without_a_checkpoint_there_is_nothing_to_evaluate(tmp_path):

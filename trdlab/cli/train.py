@@ -149,7 +149,7 @@ def evaluate(
     else:
         console, ascii_only = common.new_console()
         console.print(evaluation_page(result, ascii_only=ascii_only))
-    _say(errors, f"Kept: {kept}")
+    _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
 
 
 def runs(

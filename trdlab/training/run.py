@@ -23,6 +23,7 @@ from trdlab.runs import (
     save_checkpoint,
 )
 from trdlab.runs.folder import check_free
+from trdlab.training.loading import run_settings
 from trdlab.training.setup import (
     describe,
     make_environments,
@@ -98,7 +99,7 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
         TrdlabError: another process holds it, or something is torn.
     """
     folder = RunFolder.open(path)
-    settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
+    settings = run_settings(folder)
     check_imported(settings.env)
     with ExitStack() as stack:
         stack.enter_context(folder.held())

@@ -22,7 +22,14 @@ from safetensors.torch import save_file
 from trdlab.cli import main
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError, OutputError, TrdlabError
-from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_metrics, to_toml
+from trdlab.runs import (
+    RunFolder,
+    checkpoint_steps,
+    list_runs,
+    load_checkpoint,
+    read_metrics,
+    to_toml,
+)
 from trdlab.training.loading import load
 from trdlab.training.run import begin, carry_on, resume
 
@@ -225,6 +232,33 @@ def test_where_the_environment_cannot_be_restored_new_episodes_begin(tmp_path, t
     [line] = [line for line in err.splitlines() if "Wayward-v0 did something else" in line]
     assert line.endswith("New episodes are begun in their place.")
     assert load_checkpoint(RunFolder.open(tmp_path / "run")).step == 120
+
+
+def test_runs_that_begin_at_once_get_names_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    create = RunFolder.create
+
+    def overtaken(path: Path, *words: Any) -> RunFolder:
+        monkeypatch.setattr(RunFolder, "create", create)
+        with begin(settings(learning_rate=0.1)) as quicker:
+            assert quicker.folder.path == path
+        return create(path, *words)
+
+    monkeypatch.setattr(RunFolder, "create", overtaken)
+    with begin(settings(learning_rate=0.2)) as run, begin(settings(learning_rate=0.3)) as third:
+        pass
+    assert run.folder.path == Path("runs/CartPole-v1-N2-w2-seed1-2")
+    assert third.folder.path == Path("runs/CartPole-v1-N2-w2-seed1-3")
+    assert [run.config["learning_rate"] for run in list_runs(Path("runs"))] == [0.1, 0.2, 0.3]
+    with (
+        pytest.raises(OutputError, match="holds a run already"),
+        begin(settings(), third.folder.path),
+    ):
+        pass
+    Path("runs").rename("elsewhere")
+    Path("runs").touch()
+    with pytest.raises(OutputError, match="Cannot make"), begin(settings()):
+        pass
 
 
 # ---- refused -------------------------------------------------------------------------------------

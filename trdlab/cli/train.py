@@ -193,7 +193,7 @@ def _train(
     given: dict[str, Any],
 ) -> None:
     from trdlab.training.run import begin
-    from trdlab.training.setup import default_path, plan, read_settings
+    from trdlab.training.setup import plan, read_settings
 
     settings = read_settings(kind, env, preset_name, config, given)
     if dry_run:
@@ -203,7 +203,7 @@ def _train(
         page = plan_page(plan(settings), ascii_only=ascii_only)
         console.print(page, soft_wrap=True)  # so that the configuration can be copied
         return
-    _carry_on(lambda: begin(settings, out or default_path(settings)))
+    _carry_on(lambda: begin(settings, out))
 
 
 def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:

@@ -184,7 +184,7 @@ def check_free(path: Path) -> None:
 def free_name(parent: Path, stem: str) -> Path:
     """Returns the first of `stem`, `stem-2`, `stem-3`, … that is not there yet."""
     names = (parent / (stem if at == 1 else f"{stem}-{at}") for at in count(1))
-    return next(path for path in names if not path.exists())
+    return next(path for path in names if not path.exists() and not path.is_symlink())
 
 
 def is_run(path: Path) -> bool:

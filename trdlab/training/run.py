@@ -14,7 +14,7 @@ from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
 from trdlab.deep.weights import read_weights
 from trdlab.environments.making import check_imported
-from trdlab.errors import InputError, TrdlabError
+from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.runs import (
     MetricsFile,
     RunFolder,
@@ -22,9 +22,10 @@ from trdlab.runs import (
     load_checkpoint,
     save_checkpoint,
 )
-from trdlab.runs.folder import check_free
+from trdlab.runs.folder import check_free, is_run
 from trdlab.training.loading import run_settings
 from trdlab.training.setup import (
+    default_path,
     describe,
     make_environments,
     memory_of,
@@ -68,8 +69,12 @@ class Run:
 
 
 @contextmanager
-def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
+def begin(settings: TrainSettings, path: Path | None = None) -> Iterator[Run]:
     """Begins a run in a new folder.
+
+    Args:
+        settings: what to do.
+        path: the folder; by default a new one, of a name that no other run takes meanwhile.
 
     Raises:
         InputError: the environments cannot be made, or have no network.
@@ -77,10 +82,10 @@ def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
         TrdlabError: the replay memory does not fit into what is free.
     """
     with ExitStack() as stack:
-        check_free(path)
+        if path is not None:
+            check_free(path)
         trainer, memory = _trainer(settings, stack)
-        extra = {"environment": describe(trainer.environments), **_given_weights(trainer)}
-        folder = RunFolder.create(path, trainer.settings.to_config(), extra)
+        folder = _new_folder(trainer, path)
         stack.enter_context(folder.held())
         yield Run(folder, trainer, stack.enter_context(MetricsFile(folder.metrics, 0)), memory)
 
@@ -168,6 +173,18 @@ def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
     memory = memory_of(settings, environments)
     check_memory(memory, settings.capacity)
     return new_trainer(resolved(settings, environments), environments), memory
+
+
+def _new_folder(trainer: Trainer, path: Path | None) -> RunFolder:
+    """Makes the folder of a run; without a path it looks for a name until one is its own."""
+    extra = {"environment": describe(trainer.environments), **_given_weights(trainer)}
+    while True:
+        place = path or default_path(trainer.settings)
+        try:
+            return RunFolder.create(place, trainer.settings.to_config(), extra)
+        except OutputError:
+            if path or not is_run(place):
+                raise  # else a run that began at the same time was quicker
 
 
 def _restore(

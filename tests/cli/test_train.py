@@ -1,13 +1,16 @@
 """`trdlab train`, `resume`, `evaluate` and `runs` as their users see them."""
 
+import fcntl
 import io
 import json
 import os
+import pty
 import re
 import shutil
 import signal
 import subprocess
 import sys
+import termios
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,6 +25,7 @@ from trdlab.cli import main
 from trdlab.cli.options import flag
 from trdlab.cli.progress import TrainingProgress, stopping
 from trdlab.deep.presets import PRESETS, preset
+from trdlab.runs import RunFolder, checkpoint_steps
 from trdlab.training.loading import load
 
 Outcome = tuple[int, str, str]
@@ -401,9 +405,12 @@ def test_on_a_terminal_there_is_a_bar():
     assert "━" in shown
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_asks_and_the_next_one_is_not_held_up(number):
-    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {each: signal.getsignal(each) for each in SIGNALS}
     with stopping() as stop:
         assert not stop()
         signal.raise_signal(number)
@@ -413,3 +420,41 @@ def test_a_signal_asks_and_the_next_one_is_not_held_up(number):
     with stopping():
         assert signal.getsignal(number) is not before[number]
     assert {each: signal.getsignal(each) for each in before} == before
+
+
+def test_what_nohup_ignores_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stopping() as stop:
+            signal.raise_signal(signal.SIGHUP)
+            assert not stop()
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_terminal_that_is_closed_stops_and_saves(tmp_path):
+    out, (ours, theirs) = tmp_path / "run", pty.openpty()
+    words = ["train", "gym", "CartPole-v1", *SMALL, "--agent-steps=1000000", "--out", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "trdlab", *words],
+        stdin=theirs, stdout=theirs, stderr=theirs,
+        preexec_fn=lambda: (os.setsid(), fcntl.ioctl(0, termios.TIOCSCTTY, 0)),
+    ) as process:  # fmt: skip
+        os.close(theirs)
+        seen = b""
+        while b"of 1,000,000 steps" not in seen:
+            seen += os.read(ours, 1000)
+        os.close(ours)
+        assert process.wait(60) == 129
+    assert len(checkpoint_steps(RunFolder.open(out))) == 1
+
+
+def test_a_run_that_will_learn_nothing_says_so(trdlab, tmp_path):
+    words = ("train", "gym", "CartPole-v1", *SMALL, "--learning-starts", 120)
+    line = (
+        "Nothing will be learned: updates begin after 120 agent steps, and the run ends after 120."
+    )
+    code, _, err = trdlab(*words, "--out", tmp_path / "run")
+    assert (code, line in err.splitlines()) == (0, True)
+    assert line in trdlab(*words, "--dry-run")[1].splitlines()

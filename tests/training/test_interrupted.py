@@ -214,7 +214,11 @@ def test_a_stopped_run_is_saved_at_that_very_step_and_goes_on_from_there(
 ):
     out = tmp_path / "my run"
     words = train(out, 1)
-    for sent, code, moment in ((signal.SIGINT, 130, 101), (signal.SIGTERM, 143, 203)):
+    for sent, code, moment in (
+        (signal.SIGINT, 130, 101),
+        (signal.SIGTERM, 143, 161),
+        (signal.SIGHUP, 129, 203),
+    ):
         command.start(words)
         wait_until(has_told(out, moment))
         command.send(sent)

@@ -63,6 +63,14 @@ class Faulty(CartPoleEnv):
         return observation, self.pays if self.steps == self.at else reward, *rest
 
 
+class Grown(CartPoleEnv):
+    """Has gained an action."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.action_space = gym.spaces.Discrete(3)
+
+
 class Wayward(CartPoleEnv):
     """Takes no notice of its seed."""
 
@@ -428,6 +436,16 @@ def test_two_processes_do_not_train_one_run(trained, whole, trdlab):
     assert result(finish(trained, step=90)) == result(whole)
 
 
+def test_an_environment_that_gained_an_action_is_refused_by_all(tmp_path, trdlab):
+    gym.register("Growing-v0", CartPoleEnv)
+    run = train(tmp_path / "run", "Growing-v0")
+    gym.registry["Growing-v0"].entry_point = Grown
+    for command in ("resume", "evaluate", "explain"):
+        message = "'Growing-v0' does not fit the agent: its actions are 3, those of the agent 2."
+        refused(trdlab(command, run), 2, message)
+    del gym.registry["Growing-v0"]
+
+
 def test_a_memory_that_does_not_fit_is_refused_before_anything_is_done(tmp_path, trdlab):
     words = ("train", "gym", "CartPole-v1", "--capacity", 10**13, "--out", tmp_path / "run")
     message = "A replay memory of 10000000000000 transitions takes about"
@@ -479,6 +497,17 @@ def test_code_in_place_of_weights_is_not_executed(tmp_path, trdlab):
     refused(trdlab(*words, "--dry-run"), 2, "weights.pt' holds code")
     assert not mark.exists()
     assert not out.exists()
+
+
+@pytest.mark.parametrize("value", ["nan", "-inf"])
+def test_weights_that_are_no_numbers_are_refused(whole, tmp_path, trdlab, value):
+    state = load(whole).network.state_dict()
+    state["head.bias"][1] = float(value)
+    torch.save(state, tmp_path / "weights.pt")
+    words = ("train", "gym", "CartPole-v1", "--weights", tmp_path / "weights.pt", "--out")
+    message = f"weights.pt' has {value} in 'head.bias'. Name other weights."
+    refused(trdlab(*words, tmp_path / "run"), 2, message)
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_run_begins_with_the_weights_of_another(whole, tmp_path):

@@ -210,7 +210,7 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
     """Trains a run to its end or to the next signal, and evaluates it at the end."""
     from trdlab.cli.progress import TrainingProgress, stopping
     from trdlab.deep.memory import available_memory
-    from trdlab.show.training import duration, memory_line
+    from trdlab.show.training import duration, memory_line, updates_lines
     from trdlab.training.run import carry_on
 
     errors = _errors()
@@ -218,6 +218,8 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
         path, settings = run.folder.path, run.trainer.settings
         _say(errors, f"Run: {path}")
         _say(errors, memory_line(run.memory, available_memory()))
+        for line in updates_lines(settings):
+            _say(errors, line)
         if run.problem is not None:
             _say(errors, f"{run.problem.cause} New episodes are begun in their place.")
         with TrainingProgress(errors, settings.agent_steps, run.trainer.agent_steps) as progress:

@@ -8,12 +8,19 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 
 from trdlab.deep.settings import TrainSettings
+from trdlab.environments import Environments
 from trdlab.environments.making import check_imported
-from trdlab.errors import OutputError, TrdlabError
+from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate
 from trdlab.runs import RunFolder, read_arrays
-from trdlab.training.setup import described_space, future, make_environments, use_threads
+from trdlab.training.setup import (
+    describe,
+    described_space,
+    future,
+    make_environments,
+    use_threads,
+)
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
@@ -74,6 +81,40 @@ def _described(folder: RunFolder) -> tuple[gym.Space[Any], int]:
         ) from error
 
 
+def fitting(environments: Environments, folder: RunFolder, name: str) -> dict[str, Any]:
+    """Returns what is known of environments, if they are what a run's agent was trained in.
+
+    Args:
+        environments: where it is to act.
+        folder: of the run.
+        name: what to call the environments in errors.
+
+    Raises:
+        InputError: they show something else, or have other actions.
+        TrdlabError: the manifest is torn.
+    """
+    space, num_actions = _described(folder)
+    found = describe(environments)
+    for what, here, learned in (
+        ("observations", _say(described_space(found["observation"])), _say(space)),
+        ("actions", found["num_actions"], num_actions),
+    ):
+        if here != learned:
+            raise InputError(
+                f"'{name}' does not fit the agent: its {what} are {here}, those of the agent "
+                f"{learned}.",
+                "Give an environment with the same ones.",
+            )
+    return found
+
+
+def _say(space: gym.Space[Any]) -> str:
+    if isinstance(space, gym.spaces.Discrete):
+        first = f" from {space.start} on" if space.start else ""
+        return f"{space.n} states{first}"
+    return f"{'×'.join(map(str, space.shape or ())) or '1'} {space.dtype}"
+
+
 def evaluate_run(
     path: Path,
     *,
@@ -97,7 +138,8 @@ def evaluate_run(
         The evaluation, and the file that holds it, or why it could not be kept.
 
     Raises:
-        InputError: there is no run, no such checkpoint, or the environments cannot be made.
+        InputError: there is no run, no such checkpoint, or the environments cannot be made, or
+            are not what the agent was trained in.
         NotImported: its environment needs a module that has not been imported.
         TrdlabError: something is torn.
     """
@@ -110,6 +152,7 @@ def evaluate_run(
     chance = settings.evaluate_epsilon if epsilon is None else epsilon
     environments = make_environments(settings, num_envs=count, seed=seed)
     try:
+        fitting(environments, folder, settings.env)
         result = evaluate(estimator, environments, epsilon=chance, seed=seed, on_episode=on_episode)
     finally:
         environments.close()

@@ -23,7 +23,7 @@ from trdlab.runs import (
     save_checkpoint,
 )
 from trdlab.runs.folder import check_free, is_run
-from trdlab.training.loading import run_settings
+from trdlab.training.loading import fitting, run_settings
 from trdlab.training.setup import (
     default_path,
     describe,
@@ -109,6 +109,7 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(folder.held())
         trainer, memory = _trainer(settings, stack)
+        fitting(trainer.environments, folder, settings.env)
         if checkpoint_steps(folder) or step is not None:
             seconds, problem = _restore(trainer, folder, step)
         else:

@@ -61,6 +61,43 @@ def amount(value: float, decimals: int | None = None) -> str:
     return number(value, decimals_for([value]) if decimals is None else decimals)
 
 
+def said(value: float, digits: int = 3) -> str:
+    """Returns a number as sentences say it: significant digits, without zeros at their end.
+
+    Whole numbers keep all their digits.
+
+    >>> said(2.7075), said(4.0), said(-0.0475), said(1234.5), said(2.71e-12)
+    ('2.71', '4', '-0.0475', '1234', '2.71e-12')
+    """
+    if value == 0.0 or not math.isfinite(value):
+        return number(value)
+    if not _SMALLEST_FIXED <= abs(value) < _LARGEST_FIXED:
+        mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+        return f"{_bare(mantissa)}e{exponent}"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return _bare(f"{value:.{decimals}f}")
+
+
+def digits_to_tell(values: Iterable[float], least: int = 3) -> int:
+    """Returns the significant digits at which different numbers look different (at most 15).
+
+    >>> [digits_to_tell(pair) for pair in ([3.26, 3.52], [4.0, 3.99999], [1e12, 1.001e12])]
+    [3, 6, 4]
+    """
+    told: list[float] = []
+    for value in values:
+        if not any(math.isclose(value, other, rel_tol=1e-12) for other in told):
+            told.append(value)
+    for digits in range(least, 15):
+        if len({said(value, digits) for value in told}) == len(told):
+            return digits
+    return 15 if len(told) > 1 else least
+
+
+def _bare(text: str) -> str:
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
 def plain(value: float) -> str:
     """Returns a given number, such as γ, with as many digits as it needs (at most 12).
 

@@ -1,6 +1,6 @@
 """The agent that is explained: an estimator, the policy it describes, and where it acts."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from trdlab.agents.models import (
 )
 from trdlab.agents.places import Make, Place, check_fits, find_place, refuse_arguments
 from trdlab.decomposition import TimeAxis
-from trdlab.environments import Environments
+from trdlab.environments.making import check_imported
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.gridworld import map_names
@@ -205,7 +205,7 @@ def run_agent(
         TrdlabError: something is torn.
     """
     from trdlab.deep.settings import TrainSettings
-    from trdlab.training.loading import load
+    from trdlab.training.loading import fitting, load
     from trdlab.training.setup import use_threads
 
     folder = RunFolder.open(path)
@@ -217,19 +217,21 @@ def run_agent(
     place = _place(settings, env, env_arguments)
     environments = place.make(1, 0)
     try:
-        told = _fitting(environments, folder.manifest["environment"], place.words[1])
+        told = fitting(environments, folder, place.words[1])
     finally:
         environments.close()
     names = tuple(told["action_names"])
     at = "" if step is None else f"@{step}"
     per_second = told["frames_per_second"]
+    module = settings.env.rpartition(":")[0]
+    needed = ("--import", module) if module and env is None else ()
     return Agent(
         name=f"{folder.path.name}{at}",
         estimator=estimator,
         action_names=names or tuple(f"action {i}" for i in range(told["num_actions"])),
         make=place.make,
         seconds_per_step=told["frame_skip"] / per_second if per_second else None,
-        words=(f"{path}{at}", *(() if env is None else place.words)),
+        words=(f"{path}{at}", *needed, *(() if env is None else place.words)),
         place=place.words,
         copying=_OF_GAMES if _is_atari(settings, env) else _OF_OTHERS,
     )
@@ -243,38 +245,14 @@ def _place(settings: "TrainSettings", env: str | None, env_arguments: Sequence[s
     """Returns where the agent of a run acts: where it was trained, or in another environment."""
     from trdlab.training.setup import make_environments
 
+    if env is None:
+        check_imported(settings.env)
     own = (settings.env, settings.env_arg) if env is None else (env, tuple(env_arguments))
     place = find_place(*own, settings.time_axis)
     if not _is_atari(settings, env):
         return place
     there = replace(settings, env=own[0], env_arg=own[1])
     return Place(lambda num, seed: make_environments(there, num_envs=num, seed=seed), place.words)
-
-
-def _fitting(
-    environments: Environments, learned: Mapping[str, Any], name: str
-) -> Mapping[str, Any]:
-    """Returns what is known of environments, if an agent sees and can do there what it learned."""
-    from trdlab.training.setup import describe
-
-    found = describe(environments)
-    for what, key, say in (
-        ("observations", "observation", _say_observation),
-        ("actions", "num_actions", str),
-    ):
-        if found[key] != learned[key]:
-            raise InputError(
-                f"'{name}' does not fit the agent: its {what} are {say(found[key])}, those of the "
-                f"agent {say(learned[key])}.",
-                "Give an environment with the same ones.",
-            )
-    return found
-
-
-def _say_observation(observation: Mapping[str, Any]) -> str:
-    if "states" in observation:
-        return f"{observation['states']} states"
-    return f"{'×'.join(map(str, observation['shape'])) or '1'} {observation['dtype']}"
 
 
 def find_agent(

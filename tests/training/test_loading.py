@@ -17,6 +17,7 @@ import trdlab
 from trdlab.cli import main
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
+from trdlab.environments.interface import Interface
 from trdlab.errors import InputError, NotImported
 from trdlab.estimator import Estimator, Future
 from trdlab.explanations import explain, moment_of
@@ -25,7 +26,6 @@ from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs import RunFolder, load_checkpoint
 from trdlab.training.loading import evaluate_run, load
 from trdlab.training.run import begin, carry_on
-from trdlab.training.setup import described_space
 from trdlab.wrappers import TemporalRewardDecomposition, VectorTemporalRewardDecomposition
 
 DRONE = "trdlab/DroneGridworld-v0"
@@ -200,7 +200,7 @@ def test_a_run_can_be_moved_and_needs_no_environment(drone, tmp_path):
     ],
 )
 def test_what_an_agent_sees_is_read_from_the_manifest(described, space):
-    assert described_space(described) == space
+    assert Interface.from_dict({"observation": described, "num_actions": 2}).space == space
 
 
 def test_importing_trdlab_does_not_import_what_loading_needs():

@@ -1,19 +1,22 @@
-"""Exact models by their names, as agents and environments are named: `gridworld:ledge,slip=0.2`."""
+"""Exact models: by names such as `gridworld:ledge,slip=0.2`, or of what carries one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.arguments import parse_name, say_name
+from trdlab.environments.naming import numbered
 from trdlab.errors import InputError, closest
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs.folder import is_run
+from trdlab.tabular import MDP
 from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.reach import reachable
-from trdlab.tabular.toytext import make_world
+from trdlab.tabular.toytext import make_world, tabular_world
 
 GRIDWORLD, TABULAR = "gridworld:", "tabular:"
 """What stands before the name of a map or its file, and of an environment with a `P` table."""
@@ -94,15 +97,7 @@ def gridworld_model(text: str) -> Model:
         cause = f"The argument {_ANYWHERE} is '{arguments[_ANYWHERE]}'."
         raise InputError(cause, "It must be true or false.")
     env = GridworldEnv(name, **arguments)
-    running = reachable(env.mdp) & ~env.mdp.terminal_states
-    rows, columns = env.world.grid.shape
-    return Model(
-        name=say_name(env.world.grid.name, arguments),
-        world=env.world,
-        starts=running / running.sum() if env.exploring_starts else None,
-        time_limit=None,
-        usual_limit=max(_LEAST_STEPS, 4 * rows * columns),
-    )
+    return _of_gridworld(env.world, say_name(env.world.grid.name, arguments), env.exploring_starts)
 
 
 def tabular_model(text: str) -> Model:
@@ -116,13 +111,7 @@ def tabular_model(text: str) -> Model:
     """
     env_id, arguments = parse_name(text.removeprefix(TABULAR))
     world = make_world(env_id, arguments)
-    return Model(
-        name=say_name(world.name.rpartition("/")[2], arguments),
-        world=world,
-        starts=world.starts,
-        time_limit=world.time_limit,
-        usual_limit=min(max(_LEAST_STEPS, 4 * world.mdp.num_states), _MOST_STEPS),
-    )
+    return _of_world(world, say_name(world.name.rpartition("/")[2], arguments))
 
 
 def find_model(name: str) -> Model:
@@ -132,3 +121,52 @@ def find_model(name: str) -> Model:
         InputError: it cannot be made.
     """
     return tabular_model(name) if name.startswith(TABULAR) else gridworld_model(name)
+
+
+def model_of(what: Any) -> Model | None:
+    """Returns the exact model that an object is or carries, None where there is none.
+
+    Args:
+        what: a gridworld, a model with or without words, or an environment with a transition table.
+
+    Raises:
+        InputError: the table is no model.
+    """
+    if isinstance(what, Model):
+        return what
+    if isinstance(what, Gridworld):
+        return _of_gridworld(what, what.grid.name)
+    if isinstance(what, TabularWorld):
+        return _of_world(what, what.name)
+    if isinstance(what, MDP):
+        return _of_world(TabularWorld(what, "a model", numbered(what.num_actions)), "a model")
+    base, spec = getattr(what, "unwrapped", None), getattr(what, "spec", None)
+    if isinstance(base, GridworldEnv):
+        model = _of_gridworld(base.world, base.world.grid.name, base.exploring_starts)
+        return replace(model, time_limit=spec.max_episode_steps if spec else None)
+    if hasattr(base, "P") or isinstance(getattr(base, "mdp", None), MDP):
+        world = tabular_world(what)
+        return _of_world(world, world.name)
+    return None
+
+
+def _of_gridworld(world: Gridworld, name: str, exploring_starts: bool = False) -> Model:
+    running = reachable(world.mdp) & ~world.mdp.terminal_states
+    rows, columns = world.grid.shape
+    return Model(
+        name=name,
+        world=world,
+        starts=running / running.sum() if exploring_starts else None,
+        time_limit=None,
+        usual_limit=max(_LEAST_STEPS, 4 * rows * columns),
+    )
+
+
+def _of_world(world: TabularWorld, name: str) -> Model:
+    return Model(
+        name=name,
+        world=world,
+        starts=world.starts,
+        time_limit=world.time_limit,
+        usual_limit=min(max(_LEAST_STEPS, 4 * world.mdp.num_states), _MOST_STEPS),
+    )

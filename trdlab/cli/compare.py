@@ -55,11 +55,12 @@ def compare(
 
     Both play episodes, and both are asked about the states of them all.
     """
+    from trdlab.agents.naming import find_pair
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.explanations.comparison import compare as two
     from trdlab.show import comparison as show
 
-    agents = two.find_pair(
+    agents = find_pair(
         (first, second),
         gamma=gamma,
         horizon=horizon,

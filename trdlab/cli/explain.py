@@ -77,23 +77,17 @@ def explain(
     It plays an episode as the agent would, and explains one step of it.
     How far such forecasts can be trusted is judged by other episodes.
     """
-    from trdlab.agents.agent import find_agent
+    from trdlab.agents.naming import find_agent
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.decomposition import TimeAxis
     from trdlab.explanations.explained import explain_agent, parse_parts
     from trdlab.show import explained as show
 
     parts = parse_parts(what)
-    own_axis = gamma is not None or horizon is not None or width is not None
     found = find_agent(
         agent,
-        time_axis=TimeAxis(
-            0.95 if gamma is None else gamma,
-            4 if horizon is None else horizon,
-            1 if width is None else width,
-        )
-        if own_axis
-        else None,
+        gamma=gamma,
+        horizon=horizon,
+        width=width,
         env=env,
         env_arguments=env_arguments or (),
     )

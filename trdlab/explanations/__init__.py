@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from trdlab.explanations.calibration.sentences import check_trust, trust_sentences
     from trdlab.explanations.calibration.trust import Trust
     from trdlab.explanations.claims import Finding
-    from trdlab.explanations.comparison.compare import compare, find_pair
+    from trdlab.explanations.comparison.compare import compare
     from trdlab.explanations.comparison.report import Comparison
     from trdlab.explanations.episode.played import Played, play
     from trdlab.explanations.episode.revision import Revision, revise
@@ -50,7 +50,6 @@ __all__ = [
     "explain",
     "explain_agent",
     "find_flips",
-    "find_pair",
     "gridworld_moment",
     "judge",
     "moment_at",
@@ -77,7 +76,6 @@ _HOMES = {
     "gridworld_moment": "moment.exact",
     "tabular_moment": "moment.exact",
     "compare": "comparison.compare",
-    "find_pair": "comparison.compare",
     "Comparison": "comparison.report",
     "assess": "assessment",
     "moment_at": "assessment",

@@ -257,7 +257,7 @@ def try_out_in_play(
 
 def _different(episodes: Sequence[Episode]) -> tuple[Episode, ...]:
     """Returns the episodes that are not the same as one before."""
-    found = {}
+    found: dict[tuple[bytes, ...], Episode] = {}
     for e in episodes:
         found.setdefault((e.actions.tobytes(), e.rewards.tobytes(), e.expected.tobytes()), e)
     return tuple(found.values())

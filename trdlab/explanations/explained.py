@@ -113,7 +113,8 @@ def explain_agent(
     if "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
     copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
-    moment, pair, trial, story, report = None, (None, None), None, None, None
+    moment, trial, story, report = None, None, None, None
+    pair: tuple[str | None, str | None] = None, None
     with agent.begin(seed=seed, max_steps=limit) as recording:
         if any(FIELDS[part] for part in wanted):
             recording.play_to(step)
@@ -123,8 +124,8 @@ def explain_agent(
             raise InputError(
                 "There is no other action to contrast it with.", "Ask for `parts=forecast`."
             )
-        if "contrast" in wanted and pair[0] is not None and pair[1] is not None:
-            trial = try_out_in_play(agent, recording.playing, *pair, seed=seed)
+        if "contrast" in wanted and pair[0] and pair[1]:
+            trial = try_out_in_play(agent, recording.playing, pair[0], pair[1], seed=seed)
         if "episode" in wanted:
             recording.play()
             (episode,) = recording.episodes()

@@ -5,18 +5,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import gymnasium as gym
-
 from trdlab.deep.settings import TrainSettings
-from trdlab.environments import Environments
+from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
-from trdlab.errors import InputError, OutputError, TrdlabError
+from trdlab.errors import OutputError, TrdlabError
 from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate
 from trdlab.runs import RunFolder, read_arrays
 from trdlab.training.setup import (
-    describe,
-    described_space,
     future,
     make_environments,
     use_threads,
@@ -53,8 +49,9 @@ def _loaded(folder: RunFolder, step: int | None) -> tuple[int, "NetworkEstimator
     from trdlab.deep.update import load_weights
 
     settings = run_settings(folder)
-    space, num_actions = _described(folder)
-    network = build_network(space, num_actions, settings.time_axis, hidden=settings.hidden)
+    known, hidden = interface_of(folder), settings.hidden
+    actions = len(known.action_names)
+    network = build_network(known.space, actions, settings.time_axis, hidden=hidden)
     step, weights = read_arrays(folder, "q_network", step)
     load_weights(network, weights)
     return step, NetworkEstimator(network, settings.time_axis, future(settings))
@@ -69,50 +66,19 @@ def run_settings(folder: RunFolder) -> TrainSettings:
     return TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
 
 
-def _described(folder: RunFolder) -> tuple[gym.Space[Any], int]:
-    """Returns the observation space and the number of actions that a run was made with."""
+def interface_of(folder: RunFolder) -> Interface:
+    """Returns what the agent of a run sees and does.
+
+    Raises:
+        TrdlabError: the manifest is torn.
+    """
     try:
-        environment = folder.manifest["environment"]
-        return described_space(environment["observation"]), int(environment["num_actions"])
+        return Interface.from_dict(folder.manifest["environment"])
     except (LookupError, TypeError, ValueError) as error:
         raise TrdlabError(
             f"The run '{folder.path}' does not say what its agent sees: its manifest is torn.",
             "Put back the manifest.json that was written when it began.",
         ) from error
-
-
-def fitting(environments: Environments, folder: RunFolder, name: str) -> dict[str, Any]:
-    """Returns what is known of environments, if they are what a run's agent was trained in.
-
-    Args:
-        environments: where it is to act.
-        folder: of the run.
-        name: what to call the environments in errors.
-
-    Raises:
-        InputError: they show something else, or have other actions.
-        TrdlabError: the manifest is torn.
-    """
-    space, num_actions = _described(folder)
-    found = describe(environments)
-    for what, here, learned in (
-        ("observations", _say(described_space(found["observation"])), _say(space)),
-        ("actions", found["num_actions"], num_actions),
-    ):
-        if here != learned:
-            raise InputError(
-                f"'{name}' does not fit the agent: its {what} are {here}, those of the agent "
-                f"{learned}.",
-                "Give an environment with the same ones.",
-            )
-    return found
-
-
-def _say(space: gym.Space[Any]) -> str:
-    if isinstance(space, gym.spaces.Discrete):
-        first = f" from {space.start} on" if space.start else ""
-        return f"{space.n} states{first}"
-    return f"{'×'.join(map(str, space.shape or ())) or '1'} {space.dtype}"
 
 
 def evaluate_run(
@@ -152,7 +118,7 @@ def evaluate_run(
     chance = settings.evaluate_epsilon if epsilon is None else epsilon
     environments = make_environments(settings, num_envs=count, seed=seed)
     try:
-        fitting(environments, folder, settings.env)
+        interface_of(folder).check_fits(Interface.of(environments), settings.env)
         result = evaluate(estimator, environments, epsilon=chance, seed=seed, on_episode=on_episode)
     finally:
         environments.close()

@@ -13,6 +13,7 @@ from trdlab.deep.memory import check_memory
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
 from trdlab.deep.weights import read_weights
+from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.runs import (
@@ -23,7 +24,7 @@ from trdlab.runs import (
     save_checkpoint,
 )
 from trdlab.runs.folder import check_free, is_run
-from trdlab.training.loading import fitting, run_settings
+from trdlab.training.loading import interface_of, run_settings
 from trdlab.training.setup import (
     default_path,
     describe,
@@ -109,7 +110,7 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(folder.held())
         trainer, memory = _trainer(settings, stack)
-        fitting(trainer.environments, folder, settings.env)
+        interface_of(folder).check_fits(Interface.of(trainer.environments), settings.env)
         if checkpoint_steps(folder) or step is not None:
             seconds, problem = _restore(trainer, folder, step)
         else:

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 import mutants
-from trdlab.agents import Agent, gridworld_agent
+from trdlab.agents import Agent, find_pair, gridworld_agent
 from trdlab.cli import main
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations import assess
 from trdlab.explanations.calibration.report import TrustReport
 from trdlab.explanations.calibration.trust import trust
-from trdlab.explanations.comparison.compare import compare, find_pair
+from trdlab.explanations.comparison.compare import compare
 from trdlab.explanations.comparison.differences import ComparisonFinding
 from trdlab.explanations.comparison.findings import comparison_findings
 from trdlab.explanations.comparison.report import Comparison, compared

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mutants
-from trdlab.agents.agent import Agent, gridworld_agent
+from trdlab.agents import Agent, gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explanations import moment_at
 from trdlab.explanations.assessment import Copying, assess, try_out

@@ -1,13 +1,8 @@
-"""Two agents brought together: found, checked that they can be compared, and compared."""
+"""Two agents brought together: checked that they can be compared, and compared."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
-from trdlab.agents.agent import AXIS, Agent, find_agent
-from trdlab.agents.models import is_model
-from trdlab.agents.places import seen
-from trdlab.environments.naming import is_numbered
+from trdlab.agents.agent import Agent
 from trdlab.errors import InputError
 from trdlab.explanations.assessment import assess
 from trdlab.explanations.calibration.report import TrustReport
@@ -18,41 +13,6 @@ from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
 _EPISODES, _JUDGED_BY = 20, 50  # of what has to be played; of an exact table it is cheap
 _EPISODES_OF_TABLES, _TABLES_JUDGED_BY = 50, 300
 _MOST_STATES = 1_000
-
-
-def find_pair(
-    names: tuple[str, str],
-    *,
-    gamma: float | None = None,
-    horizon: int | None = None,
-    width: int | None = None,
-    env: str | None = None,
-    env_arguments: Sequence[str] = (),
-) -> tuple[Agent, Agent]:
-    """Returns two agents by their names; an exact table takes γ, N and w of a run beside it.
-
-    Args:
-        names: as `find_agent` reads them.
-        gamma: of exact tables, by default that of the run, or 0.95.
-        horizon: N of exact tables, by default that of the run, or 4.
-        width: w of exact tables, by default that of the run, or 1.
-        env: an environment to act in instead of their own (see `find_place`).
-        env_arguments: what to make that one with, as `KEY=VALUE`.
-
-    Raises:
-        InputError: there is no such agent, or something does not fit it.
-    """
-    exact = [is_model(name) for name in names]
-    own = {"gamma": gamma, "horizon": horizon, "width": width}
-    given: dict[str, Any] = {key: value for key, value in own.items() if value is not None}
-    if given and not any(exact):
-        raise InputError("Runs have their own γ, N and w.", "Leave out --gamma, --N and --w.")
-    found: dict[int, Agent] = {}
-    for i in sorted((0, 1), key=lambda i: exact[i]):  # runs first
-        axes = [agent.estimator.time_axis for agent in found.values()]
-        axis = replace(axes[0] if axes else AXIS, **given) if exact[i] else None
-        found[i] = find_agent(names[i], time_axis=axis, env=env, env_arguments=env_arguments)
-    return found[0], found[1]
 
 
 def compare(
@@ -90,8 +50,9 @@ def compare(
     if count < 1:
         raise InputError(f"There are {count} episodes.", "Ask for at least 1.")
     check_comparable(first, second)
-    away = () if second.place == first.place else first.place
-    there = replace(second, make=first.make, place=first.place, words=(*second.words, *away))
+    there = replace(second, make=first.make, origin=None)
+    if first.origin and second.origin:
+        there = replace(there, origin=second.origin.at(first.origin))
     players = (first, there)
     longest = max(usual_limit(agent.estimator.time_axis) for agent in players)
     limit = longest if max_steps is None else max_steps
@@ -110,8 +71,8 @@ def compare(
     return compared(
         visits,
         names=(first.name, second.name),
-        words=(first.words, there.words),
-        place=first.place,
+        words=(_words(first), _words(there)),
+        place=first.origin.place if first.origin else (),
         action_names=first.action_names,
         futures=(first.estimator.future, second.estimator.future),
         reports=(reports[0], reports[1]),
@@ -129,28 +90,14 @@ def check_comparable(first: Agent, second: Agent) -> None:
         InputError: they do not.
     """
     first.estimator.time_axis.shared(second.estimator.time_axis)
-    for what, one, other in (
-        ("see", *(_seen(agent) for agent in (first, second))),
-        ("have", *(_doable(agent, (first, second)) for agent in (first, second))),
-    ):
-        if one != other:
-            raise InputError(
-                f"{first.name} and {second.name} cannot be compared: they {what} {one} and "
-                f"{other}.",
-                "Compare agents that see and do the same.",
-            )
+    if differs := first.interface.unlike(second.interface):
+        raise InputError(
+            f"{first.name} and {second.name} cannot be compared: they have {differs[0]} and "
+            f"{differs[1]}.",
+            "Compare agents that see and do the same.",
+        )
 
 
-def _seen(agent: Agent) -> str:
-    environments = agent.make(1, 0)
-    try:
-        return seen(environments)
-    finally:
-        environments.close()
-
-
-def _doable(agent: Agent, pair: tuple[Agent, Agent]) -> str:
-    """Returns the actions; in words if both agents have words for them."""
-    named = all(not is_numbered(of.action_names) for of in pair)
-    count = len(agent.action_names)
-    return f"the actions {', '.join(agent.action_names)}" if named else f"{count} actions"
+def _words(agent: Agent) -> tuple[str, ...]:
+    """Returns what names an agent on the command line; nothing where it has no such name."""
+    return agent.origin.words if agent.origin else ()

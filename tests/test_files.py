@@ -32,7 +32,7 @@ def test_each_obstacle_is_named_once(tmp_path):
     assert refused(tmp_path / "no" / "a.png") == (
         f"The folder '{tmp_path / 'no'}' does not exist. Create it first."
     )
-    assert refused(old) == f"The file '{old}' exists. Choose another name, or --overwrite."
+    assert refused(old) == f"The file '{old}' exists. Choose another name, or `overwrite=True`."
     assert refused(folder, overwrite=True) == f"'{folder}' is a folder. Name a file."
     check_output(old, SUFFIXES, overwrite=True)
     assert old.read_text() == "old"

@@ -6,6 +6,9 @@ from collections.abc import Iterable
 class TrdlabError(Exception):
     """Base class of every error raised on purpose; the command line exits with `exit_code`.
 
+    A message names arguments as Python does, between backticks, such as `env` or `episodes=50`;
+    only the command line knows the options that they are there.
+
     Args:
         cause: what went wrong, with the offending value.
         cure: what to do about it, if there is something to do.

@@ -43,7 +43,7 @@ def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = Fal
     if is_folder:
         raise OutputError(f"'{path}' is a folder.", "Name a file.")
     if exists and not overwrite:
-        raise OutputError(f"The file '{path}' exists.", "Choose another name, or --overwrite.")
+        raise OutputError(f"The file '{path}' exists.", "Choose another name, or `overwrite=True`.")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"The folder '{folder}' is not writable.", "Choose another one.")
 

@@ -220,7 +220,7 @@ def test_a_torn_checkpoint_is_named_and_never_skipped(run, name, damage):
         load_checkpoint(run)
     assert str(caught.value).startswith("The checkpoint at step 2 cannot be used: '")
     assert path.name[:8] in str(caught.value)
-    assert "The one at step 1 is whole: --checkpoint 1, or" in str(caught.value)
+    assert "The one at step 1 is whole: `checkpoint=1`, or" in str(caught.value)
     assert same(load_checkpoint(run, 1).state, a_state(1))
     save_checkpoint(run, 2, a_state(2), some_blocks(2))  # the run goes on from there
     assert same(load_checkpoint(run).state, a_state(2))

@@ -52,13 +52,13 @@ def test_what_is_there_is_never_replaced(tmp_path):
         "--out."
     )
     assert RunFolder.open(path).config == {}
-    with pytest.raises(OutputError, match=r"' is not empty\. Choose another --out\."):
+    with pytest.raises(OutputError, match=r"' is not empty\. Choose another `out`\."):
         RunFolder.create(tmp_path, {})
     file = tmp_path / "file"
     file.write_text("mine")
-    with pytest.raises(OutputError, match=r"' is a file\. Choose another --out\."):
+    with pytest.raises(OutputError, match=r"' is a file\. Choose another `out`\."):
         RunFolder.create(file, {})
-    with pytest.raises(OutputError, match=r"Cannot make '.*/run': .*Choose another --out\."):
+    with pytest.raises(OutputError, match=r"Cannot make '.*/run': .*Choose another `out`\."):
         RunFolder.create(file / "run", {})
     assert file.read_text() == "mine"
 

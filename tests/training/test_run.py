@@ -324,7 +324,7 @@ def test_a_torn_checkpoint_is_named_with_one_that_is_whole(trained, whole, trdla
     torn = trained / "checkpoints" / "000000120" / "memory.safetensors"
     torn.write_bytes(torn.read_bytes()[:-1])
     before = contents(trained)
-    message = "The one at step 90 is whole: --checkpoint 90, or"
+    message = "The one at step 90 is whole: `checkpoint=90`, or"
     refused(trdlab("resume", trained), 1, message)
     assert contents(trained).items() >= before.items()
     assert trdlab("resume", trained, "--checkpoint", 90)[0] == 0

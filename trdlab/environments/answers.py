@@ -66,7 +66,7 @@ def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool
         raise InputError(
             f"{name}.step() does not return five values ({error}).",
             "Return observation, reward, terminated, truncated, info, as Gymnasium asks since "
-            "0.26: `done` became two.",
+            "0.26: 'done' became two.",
         ) from error
     paid = float(reward) if isinstance(reward, int | float) else _number(reward, name)
     return observation, paid, bool(terminated), bool(truncated)

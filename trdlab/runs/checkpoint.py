@@ -234,7 +234,7 @@ def _torn(run: RunFolder, torn: Saved, error: TrdlabError) -> TrdlabError:
         f"The checkpoint at step {torn.step} cannot be used: {error.cause}",
         "No other one is whole."
         if whole is None
-        else f"The one at step {whole} is whole: --checkpoint {whole}, or {run.path}@{whole}.",
+        else f"The one at step {whole} is whole: `checkpoint={whole}`, or {run.path}@{whole}.",
     )
 
 

@@ -71,7 +71,7 @@ class RunFolder:
         except OSError as error:
             reason = error.strerror or error
             raise OutputError(
-                f"Cannot make '{path}': {reason}.", "Choose another --out."
+                f"Cannot make '{path}': {reason}.", "Choose another `out`."
             ) from error
         except OutputError:
             check_free(path)  # another process may have made it meanwhile
@@ -174,11 +174,11 @@ def check_free(path: Path) -> None:
     if is_run(path):
         raise OutputError(
             f"'{path}' holds a run already.",
-            f"Go on with it: trdlab resume {shlex.quote(str(path))}, or choose another --out.",
+            f"Go on with it: trdlab resume {shlex.quote(str(path))}, or choose another `out`.",
         )
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         kind = "is not empty" if path.is_dir() else "is a file"
-        raise OutputError(f"'{path}' {kind}.", "Choose another --out.")
+        raise OutputError(f"'{path}' {kind}.", "Choose another `out`.")
 
 
 def free_name(parent: Path, stem: str) -> Path:

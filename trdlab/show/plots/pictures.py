@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from trdlab.errors import OutputError
 from trdlab.files import check_output, write_whole
 
-_CURE = "Choose another --out."
+_CURE = "Choose another `out`."
 
 
 def check_pictures(paths: Collection[Path]) -> None:

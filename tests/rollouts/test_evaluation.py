@@ -128,7 +128,7 @@ def test_episodes_are_cut_off_where_one_asks_for_it():
 
 
 def test_what_neither_acts_nor_decomposes_is_refused():
-    with pytest.raises(InputError, match="A str neither acts nor decomposes"):
+    with pytest.raises(InputError, match="This str neither acts nor decomposes"):
         evaluate("greedy", Scripted([1]))  # type: ignore[arg-type]
 
 

@@ -7,10 +7,10 @@ import gymnasium as gym
 
 from trdlab.agents.agent import Agent
 from trdlab.agents.models import GRIDWORLD, TABULAR, Model, gridworld_model, tabular_model
-from trdlab.agents.places import AXIS, Origin, Place, find_place, look, refuse_arguments
+from trdlab.agents.places import AXIS, Origin, Place, Where, find_place, look, refuse_arguments
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.interface import Interface
-from trdlab.environments.sources import EnvSource
+from trdlab.environments.naming import is_numbered
 from trdlab.policies import Memoryless
 from trdlab.rollouts.branches import Copying
 from trdlab.tabular import ExactTable, exact
@@ -22,7 +22,7 @@ def gridworld_agent(
     map_name: str,
     time_axis: TimeAxis,
     *,
-    env: EnvSource | None = None,
+    env: Where | None = None,
     env_arguments: Sequence[str] = (),
 ) -> Agent:
     """Returns the exact table of a gridworld as an agent that acts optimally in it.
@@ -45,7 +45,7 @@ def tabular_agent(
     env_id: str,
     time_axis: TimeAxis,
     *,
-    env: EnvSource | None = None,
+    env: Where | None = None,
     env_arguments: Sequence[str] = (),
 ) -> Agent:
     """Returns the exact table of an environment's model as an agent that acts optimally in it.
@@ -68,7 +68,7 @@ def _named(
     called: str,
     model: Model,
     time_axis: TimeAxis,
-    env: EnvSource | None,
+    env: Where | None,
     env_arguments: Sequence[str],
 ) -> Agent:
     if env is None:
@@ -104,13 +104,16 @@ def model_agent(
     if place is None:
         place = find_place(model, (), time_axis)
     else:
-        own.check_fits(look(place), place.name)
+        found = look(place)
+        own.check_fits(found, place.name)
+        if is_numbered(world.action_names):
+            own = replace(own, action_names=found.action_names)
     solved = exact(world.mdp, time_axis) if table is None else table
     policy = solved.solution.policy
     return Agent(
         name=model.name,
         estimator=solved,
-        action_names=world.action_names,
+        action_names=own.action_names,
         make=place.make,
         policy=Memoryless(lambda states: policy[states]),
         world=world,

@@ -8,8 +8,7 @@ from typing import Any
 from trdlab.agents.agent import Agent
 from trdlab.agents.exact import gridworld_agent, tabular_agent
 from trdlab.agents.models import GRIDWORLD, TABULAR, is_model
-from trdlab.agents.places import AXIS, changed
-from trdlab.environments.sources import EnvSource
+from trdlab.agents.places import AXIS, Where, changed
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
 from trdlab.runs.checkpoint import checkpoint_steps
@@ -27,7 +26,7 @@ def find_agent(
     gamma: float | None = None,
     horizon: int | None = None,
     width: int | None = None,
-    env: EnvSource | None = None,
+    env: Where | None = None,
     env_arguments: Sequence[str] = (),
 ) -> Agent:
     """Returns an agent by its name.
@@ -92,7 +91,7 @@ def find_pair(
     gamma: float | None = None,
     horizon: int | None = None,
     width: int | None = None,
-    env: EnvSource | None = None,
+    env: Where | None = None,
     env_arguments: Sequence[str] = (),
 ) -> tuple[Agent, Agent]:
     """Returns two agents by their names; an exact table takes γ, N and w of a run beside it.

@@ -1,17 +1,21 @@
 """Where an agent acts: its own environments, or others that it is put into."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
-from trdlab.agents.models import Model, find_model, is_model
+from trdlab.agents.models import Model, World, find_model, is_model, model_of
 from trdlab.decomposition import TimeAxis
-from trdlab.environments.arguments import parse_arguments
+from trdlab.environments.arguments import parse_arguments, say_arguments
 from trdlab.environments.batches import Make
 from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.interface import Interface
 from trdlab.environments.sources import EnvSource
 from trdlab.errors import InputError
+from trdlab.tabular import MDP
+
+Where = EnvSource | Model | World | MDP
+"""What says where an agent acts."""
 
 AXIS = TimeAxis(0.95, 4)
 """Of an exact table, where nothing is said."""
@@ -91,19 +95,20 @@ class Place:
     is_named: bool = True
 
 
-def find_place(env: EnvSource | Model, env_arguments: Sequence[str], time_axis: TimeAxis) -> Place:
+def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) -> Place:
     """Returns the place of a name, or of an environment.
 
     Args:
         env: `gridworld:NAME`, a map file, or `tabular:ENV_ID`, with arguments after commas; the id
             of a Gymnasium environment; an environment, or a function that makes one; or a model.
+            An environment is acted in even where it carries a model.
         env_arguments: what to make one of an id with, as `KEY=VALUE`.
         time_axis: of the agent; episodes of a model without a limit last four horizons or longer.
 
     Raises:
         InputError: there is no such model, or it is given arguments that are not in its name.
     """
-    model = env if isinstance(env, Model) else None
+    model = model_of(env) if isinstance(env, Model | World | MDP) else None
     if isinstance(env, str) and is_model(env):
         refuse_arguments(env, env_arguments)
         model = find_model(env)
@@ -123,6 +128,15 @@ def find_place(env: EnvSource | Model, env_arguments: Sequence[str], time_axis: 
         tuple(env_arguments),
         is_named=isinstance(source, str),
     )
+
+
+def as_words(env_arguments: Mapping[str, Any]) -> tuple[str, ...]:
+    """Returns arguments of an environment as they are written, `KEY=VALUE`.
+
+    >>> as_words({"is_slippery": False, "map_name": "8x8"})
+    ('is_slippery=false', 'map_name=8x8')
+    """
+    return tuple(say_arguments({key: value}) for key, value in env_arguments.items())
 
 
 def refuse_arguments(name: str, env_arguments: Sequence[str]) -> None:

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 from trdlab.agents.agent import Agent
 from trdlab.agents.models import is_model
-from trdlab.agents.places import Origin, Place, find_place
+from trdlab.agents.places import Origin, Place, Where, find_place
 from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
-from trdlab.environments.sources import EnvSource
 from trdlab.errors import InputError
 from trdlab.rollouts.branches import Copying
 from trdlab.runs.folder import RunFolder
@@ -25,7 +24,7 @@ def run_agent(
     path: Path,
     *,
     step: int | None = None,
-    env: EnvSource | None = None,
+    env: Where | None = None,
     env_arguments: Sequence[str] = (),
 ) -> Agent:
     """Returns the agent of a run, with the environments it was trained in or others that fit.
@@ -76,12 +75,12 @@ def run_agent(
     )
 
 
-def _is_atari(settings: "TrainSettings", env: EnvSource | None) -> bool:
+def _is_atari(settings: "TrainSettings", env: Where | None) -> bool:
     named = env is None or (isinstance(env, str) and not is_model(env))
     return settings.kind == "atari" and named
 
 
-def _place(settings: "TrainSettings", env: EnvSource | None, env_arguments: Sequence[str]) -> Place:
+def _place(settings: "TrainSettings", env: Where | None, env_arguments: Sequence[str]) -> Place:
     """Returns where the agent of a run acts: where it was trained, or in another environment."""
     from trdlab.training.setup import make_environments
 

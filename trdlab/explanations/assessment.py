@@ -7,7 +7,7 @@ import numpy as np
 
 from trdlab.agents.agent import Agent
 from trdlab.decomposition import RewardDecomposition
-from trdlab.environments import NotCopyable
+from trdlab.environments import NotCopyable, NotParallel
 from trdlab.errors import InputError
 from trdlab.explanations.calibration.report import TrustReport, judge
 from trdlab.explanations.moment.exact import exact_moment
@@ -105,7 +105,7 @@ class _Judging:
         try:
             branches = along(every, foils=False)
             foils = along(every, foils=True) if len(agent.action_names) > 1 else None
-        except NotCopyable as error:
+        except (NotCopyable, NotParallel) as error:
             return _Copied(lost=f"{error.cause} {LOST}")
         return _Copied(branches, foils)
 
@@ -178,6 +178,14 @@ def assess(
         seed=seed,
     )
     return replace(report, lost=copied.lost)
+
+
+def usual_episodes(agent: Agent) -> int:
+    """Returns by how many episodes an agent is judged, where nothing else is said.
+
+    Of what has to be played that is few; of an exact table it is cheap.
+    """
+    return 50 if agent.world is None else 300
 
 
 def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:

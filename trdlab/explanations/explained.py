@@ -5,7 +5,12 @@ from typing import Literal, get_args
 
 from trdlab.agents.agent import Agent
 from trdlab.errors import InputError, closest
-from trdlab.explanations.assessment import assess, moment_of_play, try_out_in_play
+from trdlab.explanations.assessment import (
+    assess,
+    moment_of_play,
+    try_out_in_play,
+    usual_episodes,
+)
 from trdlab.explanations.calibration.report import TrustReport
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import Story, tell
@@ -109,7 +114,7 @@ def explain_agent(
     """
     wanted = parts or PARTS
     limit = _limit(agent, step, max_steps)
-    count = (50 if agent.world is None else 300) if episodes is None else episodes
+    count = usual_episodes(agent) if episodes is None else episodes
     if "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
     copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None

@@ -81,18 +81,19 @@ class EpsilonGreedy:
         return (1.0 - self.epsilon) * probabilities + evenly, state
 
 
-def acting(who: Policy | Estimator) -> Policy:
-    """Returns who acts: a policy as it is, an estimator by its greedy policy.
+def acting(who: Policy | Estimator | Callable[[Any], FloatArray]) -> Policy:
+    """Returns who acts: a policy as it is, an estimator by its greedy policy, or by a function.
 
     Raises:
-        InputError: it is neither; the message says which methods are missing.
+        InputError: it is none of these; the message says which methods are missing.
     """
     if isinstance(who, Policy):
         return who
     if isinstance(who, Estimator):
         return Greedy(who)
+    if callable(who):
+        return Memoryless(who)
     raise InputError(
-        f"A {type(who).__name__} neither acts nor decomposes: it has no method act, and no "
-        "decompose.",
-        "Give a policy or an estimator; trdlab.policies.Memoryless makes one of a function.",
+        f"This {type(who).__name__} neither acts nor decomposes: it has no act and no decompose.",
+        "Give a policy, an estimator, or a function from observations to action probabilities.",
     )

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 from trdlab.agents.agent import Agent
 from trdlab.errors import InputError
-from trdlab.explanations.assessment import assess
+from trdlab.explanations.assessment import assess, usual_episodes
 from trdlab.explanations.calibration.report import TrustReport
 from trdlab.explanations.comparison.report import SIDES, Comparison, compared
 from trdlab.explanations.comparison.states import visit
 from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
 
-_EPISODES, _JUDGED_BY = 20, 50  # of what has to be played; of an exact table it is cheap
-_EPISODES_OF_TABLES, _TABLES_JUDGED_BY = 50, 300
+_EPISODES, _EPISODES_OF_TABLES = 20, 50
 _MOST_STATES = 1_000
 
 
@@ -65,8 +64,7 @@ def compare(
         def tell(progress: Progress, side: str = side) -> None:
             watch(replace(progress, what=f"{progress.what} {side}"))
 
-        enough = _JUDGED_BY if agent.world is None else _TABLES_JUDGED_BY
-        more = judged_by if judged_by is not None else episodes or enough
+        more = judged_by if judged_by is not None else episodes or usual_episodes(agent)
         reports.append(assess(agent, episodes=more, max_steps=limit, watch=tell) if more else None)
     return compared(
         visits,

@@ -14,7 +14,7 @@ from trdlab.explanations.claims import Claim
 from trdlab.explanations.comparison import background, differences
 from trdlab.explanations.comparison.differences import ComparisonFinding
 from trdlab.explanations.comparison.findings import comparison_findings
-from trdlab.explanations.comparison.report import SIDES, Comparison
+from trdlab.explanations.comparison.comparison import SIDES, Comparison
 from trdlab.explanations.slots import Form, Language, forms_of
 from trdlab.formatting import decimals_for, number
 from trdlab.show.page import fit, paragraph, vector

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 from trdlab.explanations.comparison.findings import comparison_findings
-from trdlab.explanations.comparison.report import SIDES, Comparison
+from trdlab.explanations.comparison.comparison import SIDES, Comparison
 from trdlab.intervals import Estimates
 from trdlab.show.comparison import FURTHEST, LANGUAGE, explain_command
 from trdlab.show.trust_data import plain_data, trust_to_dict

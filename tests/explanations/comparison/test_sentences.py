@@ -22,7 +22,7 @@ from trdlab.explanations.calibration.trust import trust
 from trdlab.explanations.comparison.compare import compare, find_pair
 from trdlab.explanations.comparison.differences import ComparisonFinding
 from trdlab.explanations.comparison.findings import comparison_findings
-from trdlab.explanations.comparison.report import Comparison, compared
+from trdlab.explanations.comparison.comparison import Comparison, compared
 from trdlab.explanations.comparison.states import Visits
 from trdlab.intervals import Estimates
 from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page

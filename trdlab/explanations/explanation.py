@@ -1,0 +1,105 @@
+"""An explanation: what an agent expects at a moment, why nothing else, and how far to trust it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, get_args
+
+from trdlab.agents.agent import Agent
+from trdlab.errors import InputError, closest
+from trdlab.explanations.calibration import claims as calibration
+from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.episode.story import Story
+from trdlab.explanations.moment import outcome, telling
+from trdlab.explanations.moment.moment import Choice
+from trdlab.explanations.moment.outcome import Trial
+from trdlab.explanations.rules import Claim
+from trdlab.explanations.sections import Section, at_first
+from trdlab.printable import Printable
+from trdlab.time_axis import TimeAxis
+
+Part = Literal["forecast", "contrast", "episode", "calibration"]
+PARTS: tuple[Part, ...] = get_args(Part)
+
+_OF_PART: dict[Part, tuple[str, ...]] = {
+    "forecast": ("forecast", "context"),
+    "contrast": ("contrast", "flips", "trial", "context"),
+    "episode": ("episode",),
+    "calibration": ("calibration",),
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Explanation(Printable):
+    """An agent at one moment: what it expects, why nothing else, and how far to trust that.
+
+    Args:
+        agent: whom it is about.
+        parts: what was asked for; nothing, if only what matters most is told.
+        seed: of the episode that the moment is in.
+        step: of that episode.
+        choice: the action of that moment and the one it is held against; None where nothing was
+            asked that speaks of a moment.
+        report: how far forecasts can be trusted; None where no episodes were played.
+        trial: what came of both actions where they were tried; None where they were not.
+        story: of the whole episode; None where it was not asked for.
+        max_steps: after which episodes were cut off, if not before; None for never.
+        missing: what is not known, and why, in sentences.
+    """
+
+    agent: Agent
+    parts: tuple[Part, ...]
+    seed: int
+    step: int
+    choice: Choice | None
+    report: TrustReport | None
+    trial: Trial | None = None
+    story: Story | None = None
+    max_steps: int | None = None
+    missing: tuple[str, ...] = ()
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """What the components mean."""
+        return self.agent.estimator.time_axis
+
+    @cached_property
+    def answer(self) -> tuple[Claim, ...]:
+        """The few sentences that matter most: how it does, what it expects, how far to trust it."""
+        moment = [] if self.choice is None else telling.in_brief(self.choice)
+        tried = [] if self.trial is None else outcome.in_brief(self.trial)
+        trust = [] if self.report is None else calibration.in_brief(self.report)
+        surprise = [] if self.story is None or self.story.most is None else [self.story.most]
+        return at_first([*trust[:1], *moment[:2], *tried[:1], *trust[1:2], *surprise, *moment[2:]])
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """All that was asked for, or all there is, by the question that it answers."""
+        told: list[Section] = []
+        if self.choice is not None:
+            told += telling.sections(self.choice)
+        if self.trial is not None:
+            told += outcome.sections(self.trial)
+        if self.story is not None:
+            told.append(self.story.section(self.seed))
+        if self.report is not None:
+            told += calibration.sections(self.report)
+        if self.missing:
+            told.append(Section("missing", "What is not known", notes=self.missing))
+        wanted = [name for part in self.parts or PARTS for name in _OF_PART[part]]
+        return tuple(part for part in told if part.name in wanted or part.name == "missing")
+
+
+def parse_parts(text: str | None) -> tuple[Part, ...]:
+    """Returns the parts that are written with commas between them, in a fixed order.
+
+    Raises:
+        InputError: there is no such part.
+
+    >>> parse_parts("calibration,forecast")
+    ('forecast', 'calibration')
+    """
+    words = [] if text is None else [word.strip() for word in text.split(",")]
+    for word in words:
+        if word not in PARTS:
+            raise InputError(f"There is no explanation '{word}'.", closest(word, PARTS))
+    return tuple(part for part in PARTS if part in words)

@@ -262,7 +262,8 @@ def never_behind(choice: Choice) -> Iterator[Fields]:
     axis = choice.time_axis
     for leader, other in choice.orders:
         lead = choice.moment.lead(leader, other)
-        if axis.width == 1 and axis.horizon and bool((lead >= 0).all()) and lead[-1] > 0:
+        is_ahead = bool((lead >= 0).all()) and (lead[:-1] > 0).any() and lead[-1] > 0
+        if axis.width == 1 and is_ahead:
             yield {"leader": leader, "other": other, "count": axis.horizon}
 
 

@@ -186,10 +186,10 @@ class Moment:
     def choice(self, action: str | None = None, foil: str | None = None) -> "Choice":
         """Returns an action to explain and another to hold it against, filling in what is not said.
 
-        By default these are what the policy does and the best other action that most likely leads
-        to another state: a bump into a wall is worth γ times the best action, often more than any
-        real alternative, and contrasts with nothing. Where there is no such action there is no
-        foil.
+        By default these are what the policy does and the best real alternative: another action that
+        most likely leads to another state, and expects something else if there is such a one. A
+        bump into a wall is worth γ times the best action, often more than any alternative, and
+        contrasts with nothing. Where no other action moves there is no foil.
 
         Raises:
             InputError: there is no such action, or action and foil are the same.
@@ -202,11 +202,17 @@ class Moment:
         likely = np.zeros(len(self.action_names)) if self.policy is None else self.policy
         order = np.lexsort((-self.q_values, -likely))  # by probability, then by value
         names = [self.action_names[a] for a in order]
-        if action is None:
-            action = next(name for name in names if name != foil)
         stays = dict(zip(self.action_names, self.stays or [0.0] * len(names), strict=True))
-        others = (name for name in names if name != action and stays[name] <= 0.5)
-        return Choice(self, action, foil or next(others, None))
+
+        def alternative(given: str | None) -> str | None:
+            others = [name for name in names if name != given and stays[name] <= 0.5]
+            differ = (o for o in others if given is None or self.difference(given, o).any())
+            return next(differ, next(iter(others), None))
+
+        if action is None:
+            is_free = names[0] != foil
+            action = names[0] if is_free else alternative(foil) or names[1 % len(names)]
+        return Choice(self, action, foil or alternative(action))
 
 
 @dataclass(frozen=True, eq=False)

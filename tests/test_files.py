@@ -166,7 +166,8 @@ def test_what_a_killed_process_left_is_recognised_and_no_obstacle(tmp_path):
     (tmp_path / "kept").rename(seen[0])
     assert is_leftover(seen[0])
     write_whole(tmp_path / "folder", a_folder("new"))
-    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
+    assert sorted(tmp_path.iterdir()) == [seen[0], tmp_path / "folder"]
+    assert not is_leftover(tmp_path / ".gitkeep")
 
 
 def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):

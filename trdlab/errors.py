@@ -33,6 +33,19 @@ class OutputError(InputError):
     """A result cannot be written where it was asked for."""
 
 
+class NotImported(InputError):  # noqa: N818  it says what a module is, not what failed
+    """A run needs a module that nobody has named: its code is not executed because a file says so.
+
+    Args:
+        cause: what needs it.
+        module: its name.
+    """
+
+    def __init__(self, cause: str, module: str) -> None:
+        super().__init__(cause, f"If you trust it, import {module} first.")
+        self.module = module
+
+
 def closest(name: str, known: Iterable[str]) -> str:
     """Returns the cure for a misspelt name: the nearest known one, or all of them.
 

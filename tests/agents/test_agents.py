@@ -10,8 +10,8 @@ from trdlab.agents import find_agent, gridworld_agent
 from trdlab.agents.agent import tabular_agent
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import moment_at
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 4)
 

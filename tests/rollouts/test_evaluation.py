@@ -10,6 +10,7 @@ import pytest
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import GymEnvironments, Step
+from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.rollouts.evaluation import Evaluation, evaluate
 
@@ -34,7 +35,7 @@ class Scripted:
         self.steps = np.zeros(self.num_envs, dtype=np.int64)
         return self.steps[:, None].astype(np.float32)
 
-    def step(self, actions: np.ndarray) -> Step:
+    def step(self, actions: np.ndarray, active: np.ndarray | None = None) -> Step:
         pays = np.array([story[at] for story, at in zip(self.stories, self.steps, strict=True)])
         self.steps += 1
         frames = self.steps[:, None].astype(np.float32)
@@ -119,10 +120,16 @@ def test_random_actions_do_not_depend_on_who_finishes_first():
     assert few.returns[0] == many.returns[0]
 
 
-def test_nobody_is_asked_where_all_is_random():
-    estimator = Taking()
-    evaluate(estimator, Scripted([1, 2]), epsilon=1.0)
-    assert estimator.shown == []
+def test_episodes_are_cut_off_where_one_asks_for_it():
+    result = evaluate(Taking(), Scripted([1, 2, -4], [10], [1] * 6), max_steps=3)
+    assert result.returns.tolist() == [-1, 10, 3]
+    assert result.lengths.tolist() == [3, 1, 3]
+    assert result.truncated.tolist() == [False, False, True]
+
+
+def test_what_neither_acts_nor_decomposes_is_refused():
+    with pytest.raises(InputError, match="A str neither acts nor decomposes"):
+        evaluate("greedy", Scripted([1]))  # type: ignore[arg-type]
 
 
 def test_a_gymnasium_environment_as_its_own_loop_would_play_it():

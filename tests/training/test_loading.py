@@ -14,9 +14,10 @@ import torch
 from gymnasium.wrappers import FrameStackObservation
 
 import trdlab
+from trdlab.cli import main
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
-from trdlab.errors import InputError
+from trdlab.errors import InputError, NotImported
 from trdlab.estimator import Estimator, Future
 from trdlab.explanations import explain, moment_of
 from trdlab.explanations.moment.sentences import check, sentences
@@ -98,8 +99,8 @@ def test_in_the_wrappers(drone, tmp_path, pixels):
             Future(
                 "the greedy policy of the network (for the first 2 steps, the ε-greedy one it "
                 "learned from)",
-                "sign of each reward",
-                "a lost life, or the end of the game",
+                clip_rewards=True,
+                life_loss_ends=True,
             ),
         ),
     ],
@@ -145,6 +146,25 @@ def test_an_evaluation_is_kept_with_what_it_was_made_with(drone):
     assert [kept[key] for key in ("agent_steps", "episodes", "epsilon", "seed")] == [200, 3, 1, 4]
 
 
+@pytest.mark.parametrize("harm", ["a file", "a link", "nothing"])
+def test_an_evaluation_that_cannot_be_kept_is_told_all_the_same(drone, tmp_path, capsys, harm):
+    run, elsewhere = Path(shutil.copytree(drone, tmp_path / "run")), tmp_path / "elsewhere"
+    shutil.rmtree(run / "evaluations")
+    elsewhere.mkdir()
+    if harm == "a file":
+        (run / "evaluations").touch()
+    elif harm == "a link":
+        (run / "evaluations").symlink_to(elsewhere)
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", str(run)])
+    out, err = capsys.readouterr()
+    assert end.value.code == 0
+    assert "mean return" in out
+    assert err.startswith("Kept: " if harm == "nothing" else "Not kept: ")
+    assert "Not a directory." in err or "is a link" in err or harm == "nothing"
+    assert not list(elsewhere.iterdir())
+
+
 def test_without_a_checkpoint_there_is_nothing_to_evaluate(tmp_path):
     with begin(TrainSettings("gym", "CartPole-v1"), tmp_path / "run"):
         pass
@@ -156,12 +176,12 @@ def test_without_a_checkpoint_there_is_nothing_to_evaluate(tmp_path):
 
 def test_a_run_can_be_moved_and_needs_no_environment(drone, tmp_path):
     moved = Path(shutil.copytree(drone, tmp_path / "elsewhere"))
-    config = (moved / "config.toml").read_text().replace(DRONE, "gone:Gone-v0")
-    (moved / "config.toml").write_text(config)
+    for name in ("config.toml", "manifest.json"):  # as on a machine that does not have it
+        (moved / name).write_text((moved / name).read_text().replace(DRONE, "gone:Gone-v0"))
     np.testing.assert_array_equal(
         load(moved).decompose([0]).components, load(drone).decompose([0]).components
     )
-    with pytest.raises(InputError, match=r"gone:Gone-v0 cannot be imported"):
+    with pytest.raises(NotImported, match=r"module 'gone'\. If you trust it, import gone first\."):
         evaluate_run(moved)
 
 

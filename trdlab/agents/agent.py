@@ -1,6 +1,7 @@
 """The agent that is explained: an estimator, the policy it describes, and where it acts."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,13 +17,14 @@ from trdlab.agents.models import (
 )
 from trdlab.agents.places import Make, Place, check_fits, find_place, refuse_arguments
 from trdlab.decomposition import TimeAxis
-from trdlab.environments import Environments
+from trdlab.environments.making import check_imported
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.gridworld import map_names
+from trdlab.policies import Memoryless, Policy
 from trdlab.rollouts.branches import Copying
-from trdlab.rollouts.episodes import AS_PAID, Counting, Episode, collect
-from trdlab.rollouts.playing import Policy
+from trdlab.rollouts.episodes import Episode, Recording
+from trdlab.rollouts.playing import Watch, unwatched
 from trdlab.runs.checkpoint import checkpoint_steps
 from trdlab.runs.folder import RunFolder
 from trdlab.tabular import exact
@@ -48,8 +50,7 @@ class Agent:
         estimator: what it expects.
         action_names: A names.
         make: makes the environments that it acts in.
-        policy: what the estimator describes, where that is not its own greedy policy.
-        counting: which rewards it counts, and what ends its future.
+        policy: who acts, where that is not the estimator's greedy policy.
         world: what it is the exact table of; None if it was learned.
         seconds_per_step: how long one of its steps takes as people play, if that is known.
         words: what names it on the command line, and what `make` makes if that is not its own.
@@ -62,33 +63,41 @@ class Agent:
     action_names: tuple[str, ...]
     make: Make
     policy: Policy | None = None
-    counting: Counting = AS_PAID
     world: World | None = None
     seconds_per_step: float | None = None
     words: tuple[str, ...] = ()
     place: tuple[str, ...] = ()
     copying: Copying = _OF_OTHERS
 
-    def play(self, count: int, *, seed: int, **how: Any) -> tuple[Episode, ...]:
-        """Returns episodes that the agent plays, each in an environment of its own.
+    @contextmanager
+    def begin(self, count: int = 1, *, seed: int, **how: Any) -> Iterator[Recording]:
+        """Begins episodes of the agent, to be played and paused as one likes, then closes them.
 
         Args:
-            count: of the episodes.
+            count: of the episodes, each in an environment of its own.
             seed: of the environments, and of the actions.
-            how: as for `collect`.
+            how: as for `Recording`.
         """
         environments = self.make(count, seed)
         try:
-            return collect(
-                self.estimator,
-                environments,
-                policy=self.policy,
-                counting=self.counting,
-                seed=seed,
-                **how,
-            )
+            yield Recording(self.estimator, environments, policy=self.policy, seed=seed, **how)
         finally:
             environments.close()
+
+    def play(
+        self, count: int, *, watch: Watch = unwatched, what: str = "episodes", **how: Any
+    ) -> tuple[Episode, ...]:
+        """Returns whole episodes that the agent plays, each in an environment of its own.
+
+        Args:
+            count: of the episodes.
+            watch: told how far they are, after every step.
+            what: they are called then.
+            how: as for `begin`.
+        """
+        with self.begin(count, **how) as recording:
+            recording.play(watch=watch, what=what)
+            return recording.episodes()
 
     def action(self, name: str) -> str:
         """Returns the name of an action that is given by its name or its number."""
@@ -160,7 +169,7 @@ def _exact_agent(
         estimator=table,
         action_names=model.world.action_names,
         make=place.make,
-        policy=lambda states: table.solution.policy[states],
+        policy=Memoryless(lambda states: table.solution.policy[states]),
         world=model.world,
         words=(called, *_axis_words(time_axis), *(() if env is None else place.words)),
         place=place.words,
@@ -196,7 +205,7 @@ def run_agent(
         TrdlabError: something is torn.
     """
     from trdlab.deep.settings import TrainSettings
-    from trdlab.training.loading import load
+    from trdlab.training.loading import fitting, load
     from trdlab.training.setup import use_threads
 
     folder = RunFolder.open(path)
@@ -208,20 +217,21 @@ def run_agent(
     place = _place(settings, env, env_arguments)
     environments = place.make(1, 0)
     try:
-        told = _fitting(environments, folder.manifest["environment"], place.words[1])
+        told = fitting(environments, folder, place.words[1])
     finally:
         environments.close()
     names = tuple(told["action_names"])
     at = "" if step is None else f"@{step}"
     per_second = told["frames_per_second"]
+    module = settings.env.rpartition(":")[0]
+    needed = ("--import", module) if module and env is None else ()
     return Agent(
         name=f"{folder.path.name}{at}",
         estimator=estimator,
         action_names=names or tuple(f"action {i}" for i in range(told["num_actions"])),
         make=place.make,
-        counting=Counting(settings.clip_rewards, settings.life_loss_ends),
         seconds_per_step=told["frame_skip"] / per_second if per_second else None,
-        words=(f"{path}{at}", *(() if env is None else place.words)),
+        words=(f"{path}{at}", *needed, *(() if env is None else place.words)),
         place=place.words,
         copying=_OF_GAMES if _is_atari(settings, env) else _OF_OTHERS,
     )
@@ -235,38 +245,14 @@ def _place(settings: "TrainSettings", env: str | None, env_arguments: Sequence[s
     """Returns where the agent of a run acts: where it was trained, or in another environment."""
     from trdlab.training.setup import make_environments
 
+    if env is None:
+        check_imported(settings.env)
     own = (settings.env, settings.env_arg) if env is None else (env, tuple(env_arguments))
     place = find_place(*own, settings.time_axis)
     if not _is_atari(settings, env):
         return place
     there = replace(settings, env=own[0], env_arg=own[1])
     return Place(lambda num, seed: make_environments(there, num_envs=num, seed=seed), place.words)
-
-
-def _fitting(
-    environments: Environments, learned: Mapping[str, Any], name: str
-) -> Mapping[str, Any]:
-    """Returns what is known of environments, if an agent sees and can do there what it learned."""
-    from trdlab.training.setup import describe
-
-    found = describe(environments)
-    for what, key, say in (
-        ("observations", "observation", _say_observation),
-        ("actions", "num_actions", str),
-    ):
-        if found[key] != learned[key]:
-            raise InputError(
-                f"'{name}' does not fit the agent: its {what} are {say(found[key])}, those of the "
-                f"agent {say(learned[key])}.",
-                "Give an environment with the same ones.",
-            )
-    return found
-
-
-def _say_observation(observation: Mapping[str, Any]) -> str:
-    if "states" in observation:
-        return f"{observation['states']} states"
-    return f"{'×'.join(map(str, observation['shape'])) or '1'} {observation['dtype']}"
 
 
 def find_agent(

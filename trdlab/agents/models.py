@@ -1,18 +1,16 @@
 """Exact models by their names, as agents and environments are named: `gridworld:ledge,slip=0.2`."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.environments.arguments import parse_arguments, say_arguments
+from trdlab.environments.arguments import parse_name, say_name
 from trdlab.errors import InputError, closest
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs.folder import is_run
+from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.reach import reachable
 from trdlab.tabular.toytext import make_world
@@ -87,7 +85,7 @@ def gridworld_model(text: str) -> Model:
     Raises:
         InputError: the map cannot be read, or does not take an argument.
     """
-    name, arguments = _apart(text.removeprefix(GRIDWORLD))
+    name, arguments = parse_name(text.removeprefix(GRIDWORLD))
     for key in arguments:
         if key not in _OF_GRIDWORLDS:
             cause = f"A gridworld takes no argument '{key}'."
@@ -99,7 +97,7 @@ def gridworld_model(text: str) -> Model:
     running = reachable(env.mdp) & ~env.mdp.terminal_states
     rows, columns = env.world.grid.shape
     return Model(
-        name=_together(env.world.grid.name, arguments),
+        name=say_name(env.world.grid.name, arguments),
         world=env.world,
         starts=running / running.sum() if env.exploring_starts else None,
         time_limit=None,
@@ -116,10 +114,10 @@ def tabular_model(text: str) -> Model:
     Raises:
         InputError: there is no such environment, it has no table, or does not take an argument.
     """
-    env_id, arguments = _apart(text.removeprefix(TABULAR))
+    env_id, arguments = parse_name(text.removeprefix(TABULAR))
     world = make_world(env_id, arguments)
     return Model(
-        name=_together(world.name.rpartition("/")[2], arguments),
+        name=say_name(world.name.rpartition("/")[2], arguments),
         world=world,
         starts=world.starts,
         time_limit=world.time_limit,
@@ -134,17 +132,3 @@ def find_model(name: str) -> Model:
         InputError: it cannot be made.
     """
     return tabular_model(name) if name.startswith(TABULAR) else gridworld_model(name)
-
-
-def _apart(text: str) -> tuple[str, dict[str, Any]]:
-    """Returns the name of a model and its arguments.
-
-    >>> _apart("ledge,slip=0.2")
-    ('ledge', {'slip': 0.2})
-    """
-    name, *words = text.split(",")
-    return name, parse_arguments(words)
-
-
-def _together(name: str, arguments: Mapping[str, Any]) -> str:
-    return ",".join([name, *(say_arguments({key: arguments[key]}) for key in arguments)])

@@ -8,9 +8,10 @@ from trdlab.agents.models import World, find_model, is_model
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
+from trdlab.environments.gym import GymEnvironments
+from trdlab.environments.naming import is_numbered
 from trdlab.environments.stack import observation_space
 from trdlab.errors import InputError
-from trdlab.explain.copies import CopyableGymEnvironments
 
 Make = Callable[[int, int], Environments]
 """From the number of environments and their seed to the environments."""
@@ -47,7 +48,7 @@ def find_place(env: str, env_arguments: Sequence[str], time_axis: TimeAxis) -> P
     if not is_model(env):
         arguments = parse_arguments(env_arguments)
         return Place(
-            lambda num_envs, seed: CopyableGymEnvironments(
+            lambda num_envs, seed: GymEnvironments(
                 env, num_envs, seed=seed, env_arguments=arguments
             ),
             words,
@@ -82,7 +83,8 @@ def check_fits(place: Place, world: World) -> None:
     """
     environments = place.make(1, 0)
     try:
-        names = environments.action_names or world.action_names
+        told = environments.action_names
+        names = world.action_names if is_numbered(told) else told
         found = seen(environments), environments.num_actions, names
     finally:
         environments.close()

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from trdlab.errors import TrdlabError
+from trdlab.errors import NotImported, TrdlabError
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -20,7 +20,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except TrdlabError as error:
         if {"-v", "--verbose"} & set(words):
             raise
-        _fail(f"{error.cause} {error.cure}".strip(), error.exit_code)
+        cure = error.cure
+        if isinstance(error, NotImported):
+            cure = f"If you trust it, add: --import {error.module}"
+        _fail(f"{error.cause} {cure}".strip(), error.exit_code)
     except usage_error as error:
         if not error.format_message():  # no command was given, and the help has been printed
             sys.exit(2)

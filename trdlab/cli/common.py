@@ -53,6 +53,31 @@ MaxSteps = Annotated[
     ),
 ]
 Details = Annotated[bool, typer.Option("--details", help="Tell all there is to tell.")]
+
+
+def _import(modules: list[str] | None) -> list[str] | None:
+    from trdlab.environments.making import import_named
+    from trdlab.errors import InputError
+
+    for module in modules or ():
+        try:
+            import_named(module)
+        except Exception as error:
+            raise InputError(
+                f"'{module}' cannot be imported: {error}.", "Check its name, or correct it."
+            ) from error
+    return modules
+
+
+Import = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--import",
+        metavar="MODULE",
+        callback=_import,
+        help="Import it first: a run's own environment may need it.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Show tracebacks.")]
 

@@ -46,6 +46,7 @@ def compare(
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first episode.")] = 0,
     max_steps: common.MaxSteps = None,
+    modules: common.Import = None,
     as_json: common.AsJson = False,
     out: Annotated[Path | None, common.pictures_option("without --json")] = None,
     verbose: common.Verbose = False,

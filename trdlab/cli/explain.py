@@ -67,6 +67,7 @@ def explain(
         ),
     ] = None,
     max_steps: common.MaxSteps = None,
+    modules: common.Import = None,
     as_json: common.AsJson = False,
     out: Annotated[Path | None, common.pictures_option("without --what and --json")] = None,
     verbose: common.Verbose = False,

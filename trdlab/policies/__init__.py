@@ -1,1 +1,6 @@
-"""Policies: who acts."""
+"""Policies: who acts, with memory where there is some."""
+
+from trdlab.policies.protocol import Policy, ask, rows
+from trdlab.policies.ready import EpsilonGreedy, Greedy, Memoryless, acting, greedy
+
+__all__ = ["EpsilonGreedy", "Greedy", "Memoryless", "Policy", "acting", "ask", "greedy", "rows"]

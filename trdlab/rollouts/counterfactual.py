@@ -6,11 +6,10 @@ import numpy as np
 
 from trdlab.arrays import RELATIVE_ZERO, FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.environments import CopyableEnvironments
-from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.intervals import LEVEL, RESAMPLES, Estimates, draws, percentiles
 from trdlab.rollouts.branches import Branches, Branching
+from trdlab.rollouts.playing import Playing
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +46,11 @@ class Counterfactual:
 
 def counterfactual(
     branching: Branching,
-    environments: CopyableEnvironments,
-    stack: FrameStack,
+    playing: Playing,
     action: int,
     foil: int,
     *,
-    age: int = 0,
+    age: int | None = None,
     seed: int = 0,
     level: float = LEVEL,
     resamples: int = RESAMPLES,
@@ -61,23 +59,23 @@ def counterfactual(
 
     Args:
         branching: the estimator, and how many copies to make.
-        environments: where the state is: that of the first of them.
-        stack: what the agent sees there.
+        playing: where the state is: that of the first episode.
         action: the number of one action.
         foil: the number of the other.
-        age: the steps since the episode began.
+        age: the steps since the episode began; by default those that were played.
         seed: of the copies and of the bootstrap.
         level: the probability that the intervals are made for.
         resamples: how many samples of copies are drawn.
 
     Raises:
         InputError: there is no such action, or both are the same.
+        NotCopyable: the environments cannot be copied.
     """
     if action == foil:
         raise InputError(f"Action and foil are both {action}.", "Give two different actions.")
     seeds = np.random.SeedSequence(seed).generate_state(2).tolist()
     tried = [
-        branching.at(environments, stack, first, age=age, seed=own)
+        branching.at(playing, first, age=age, seed=own)
         for first, own in zip((action, foil), seeds, strict=True)
     ]
     rng = np.random.default_rng(seed)

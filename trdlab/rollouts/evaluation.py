@@ -8,8 +8,9 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.environments import Environments
-from trdlab.environments.stack import FrameStack
 from trdlab.estimator import Estimator
+from trdlab.policies import Policy, acting
+from trdlab.rollouts.playing import Playing
 from trdlab.statistics import Estimate, bootstrap, interquartile_mean
 
 
@@ -60,40 +61,45 @@ class Evaluation:
 
 
 def evaluate(
-    estimator: Estimator,
+    who: Policy | Estimator,
     environments: Environments,
     *,
     epsilon: float = 0.0,
+    max_steps: int | None = None,
     seed: int = 0,
     on_episode: Callable[[int], None] = lambda finished: None,
 ) -> Evaluation:
-    """Plays one episode in each environment, taking the action of largest Σ components.
+    """Plays one episode in each environment, and keeps the rewards that the environment pays.
 
     Args:
-        estimator: whose greedy policy it is.
+        who: plays; an estimator by its greedy policy.
         environments: E of them, made with `seed`; they are reset.
         epsilon: the chance of a random action instead.
-        seed: of the random actions, and to be told with the result.
+        max_steps: after which an episode is cut off, if the environment has not ended it before.
+        seed: of the actions, and to be told with the result.
         on_episode: called with the number of finished episodes whenever some finish.
+
+    Raises:
+        InputError: `who` is neither policy nor estimator.
     """
-    rng, count = np.random.default_rng(seed), environments.num_envs
-    stack = FrameStack(environments.reset(), environments.stack, environments.padding)
+    count = environments.num_envs
+    playing = Playing(
+        None,
+        environments,
+        np.random.default_rng(seed),
+        policy=acting(who),
+        epsilon=epsilon,
+        chance=np.random.default_rng([seed, 1]),
+        max_steps=max_steps,
+    )
     returns, lengths = np.zeros(count), np.zeros(count, dtype=np.int64)
-    running, truncated = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-    while running.any():
-        explore = rng.random(count) < epsilon  # [E]
-        actions = rng.integers(environments.num_actions, size=count)  # [E]
-        chosen = running & ~explore
-        if chosen.any():  # those that have finished need no forward pass
-            values = estimator.decompose(stack.observations[chosen]).value  # [≤ E, A]
-            actions[chosen] = values.argmax(axis=1)
-        step = environments.step(actions)
-        stack.push(step.following, step.ended)
+    truncated = np.zeros(count, dtype=np.bool_)
+    while playing.running.any():
+        running = playing.running
+        step = playing.take(playing.turn().actions)
         returns[running] += step.rewards[running]
         lengths[running] += 1
-        truncated |= running & step.truncated
-        finishes = running & step.ended
-        running &= ~step.ended
-        if finishes.any():
-            on_episode(int(count - running.sum()))
+        truncated |= playing.finished & ~step.terminated
+        if playing.finished.any():
+            on_episode(int(count - playing.running.sum()))
     return Evaluation(returns, lengths, truncated, epsilon, seed)

@@ -25,7 +25,7 @@ def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
             side: {
                 "name": comparison.names[i],
                 "words": list(comparison.words[i]),
-                "future": asdict(comparison.futures[i]),
+                "future": comparison.futures[i].to_dict(),
                 "mean": plain_data(_of_side(comparison.means, i)),
             }
             for i, side in enumerate(SIDES)

@@ -181,7 +181,7 @@ def to_dict(explained: Explained) -> dict[str, Any]:
         "seconds_per_step": explained.agent.seconds_per_step,
         "max_steps": explained.max_steps,
         "time_axis": {**asdict(axis), "labels": axis.labels},
-        "future": asdict(explained.agent.estimator.future),
+        "future": explained.agent.estimator.future.to_dict(),
         "summary": [asdict(section) for section in summary(explained)],
         "moment": moment,
         "trial": None if explained.trial is None else _trial_to_dict(explained.trial),

@@ -20,6 +20,7 @@ def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
     lines = [
         to_toml(plan.settings.to_config()),
         memory_line(plan.memory, plan.available),
+        *updates_lines(plan.settings),
         f"Time: about {duration(plan.seconds)}, at {plan.steps_per_second:,.0f} agent steps a "
         f"second while learning (measured here, in a few seconds).",
         "Nothing was written: leave out --dry-run to train.",
@@ -96,6 +97,20 @@ def memory_line(needed: int, available: int | None) -> str:
     """
     free = "" if available is None else f", of {_gigabytes(available)} that are free"
     return f"Replay memory: up to {_gigabytes(needed)}{free}."
+
+
+def updates_lines(settings: TrainSettings) -> list[str]:
+    """Returns a line that says that a run will learn nothing; none where it will.
+
+    >>> updates_lines(TrainSettings("gym", "CartPole-v1", agent_steps=900))
+    ['Nothing will be learned: updates begin after 1,000 agent steps, and the run ends after 900.']
+    """
+    if settings.updates_due(settings.agent_steps):
+        return []
+    return [
+        f"Nothing will be learned: updates begin after {settings.learning_starts:,} agent steps, "
+        f"and the run ends after {settings.agent_steps:,}."
+    ]
 
 
 def duration(seconds: float) -> str:

@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Any
 
 import gymnasium as gym
@@ -131,13 +130,10 @@ def _nouns(estimator: Any) -> tuple[TimeAxis, Future]:
         raise ContractError(f"time_axis is {axis!r}.", "It must be a trdlab.TimeAxis.")
     if not isinstance(future, Future):
         raise ContractError(f"future is {future!r}.", "It must be a trdlab.Future.")
-    for field in fields(Future):
-        text = getattr(future, field.name)
-        if not isinstance(text, str) or not text.strip():
-            raise ContractError(
-                f"The {field.name} of its future is {text!r}.",
-                "Say whose future it is, in which reward, and what ends it.",
-            )
+    if not future.policy.strip():
+        raise ContractError(
+            f"The policy of its future is {future.policy!r}.", "Say in words whose future it is."
+        )
     return axis, future
 
 

@@ -1,17 +1,26 @@
 """The agent of a run: loaded as an Estimator, and evaluated."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
 from trdlab.deep.settings import TrainSettings
-from trdlab.errors import TrdlabError
-from trdlab.files import write_json
+from trdlab.environments import Environments
+from trdlab.environments.making import check_imported
+from trdlab.errors import InputError, OutputError, TrdlabError
+from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate
-from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
-from trdlab.training.setup import described_space, future, make_environments, use_threads
+from trdlab.runs import RunFolder, read_arrays
+from trdlab.training.setup import (
+    describe,
+    described_space,
+    future,
+    make_environments,
+    use_threads,
+)
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
@@ -34,16 +43,30 @@ def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
         InputError: there is no run, or no such checkpoint.
         TrdlabError: something is torn.
     """
+    return _loaded(RunFolder.open(Path(path)), step)[1]
+
+
+def _loaded(folder: RunFolder, step: int | None) -> tuple[int, "NetworkEstimator"]:
+    """Returns the step of a checkpoint, the newest one unless it is given, and its agent."""
     from trdlab.deep.estimator import NetworkEstimator
     from trdlab.deep.networks import build_network
     from trdlab.deep.update import load_weights
 
-    folder = RunFolder.open(Path(path))
-    settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
+    settings = run_settings(folder)
     space, num_actions = _described(folder)
     network = build_network(space, num_actions, settings.time_axis, hidden=settings.hidden)
-    load_weights(network, read_arrays(folder, "q_network", step))
-    return NetworkEstimator(network, settings.time_axis, future(settings))
+    step, weights = read_arrays(folder, "q_network", step)
+    load_weights(network, weights)
+    return step, NetworkEstimator(network, settings.time_axis, future(settings))
+
+
+def run_settings(folder: RunFolder) -> TrainSettings:
+    """Returns the settings that a run began with.
+
+    Raises:
+        InputError: they are no settings, or out of their range.
+    """
+    return TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
 
 
 def _described(folder: RunFolder) -> tuple[gym.Space[Any], int]:
@@ -58,6 +81,40 @@ def _described(folder: RunFolder) -> tuple[gym.Space[Any], int]:
         ) from error
 
 
+def fitting(environments: Environments, folder: RunFolder, name: str) -> dict[str, Any]:
+    """Returns what is known of environments, if they are what a run's agent was trained in.
+
+    Args:
+        environments: where it is to act.
+        folder: of the run.
+        name: what to call the environments in errors.
+
+    Raises:
+        InputError: they show something else, or have other actions.
+        TrdlabError: the manifest is torn.
+    """
+    space, num_actions = _described(folder)
+    found = describe(environments)
+    for what, here, learned in (
+        ("observations", _say(described_space(found["observation"])), _say(space)),
+        ("actions", found["num_actions"], num_actions),
+    ):
+        if here != learned:
+            raise InputError(
+                f"'{name}' does not fit the agent: its {what} are {here}, those of the agent "
+                f"{learned}.",
+                "Give an environment with the same ones.",
+            )
+    return found
+
+
+def _say(space: gym.Space[Any]) -> str:
+    if isinstance(space, gym.spaces.Discrete):
+        first = f" from {space.start} on" if space.start else ""
+        return f"{space.n} states{first}"
+    return f"{'×'.join(map(str, space.shape or ())) or '1'} {space.dtype}"
+
+
 def evaluate_run(
     path: Path,
     *,
@@ -66,8 +123,8 @@ def evaluate_run(
     seed: int = EVALUATION_SEED,
     step: int | None = None,
     on_episode: Callable[[int], None] = lambda finished: None,
-) -> tuple[Evaluation, Path]:
-    """Evaluates the agent of a run, and keeps the result in its folder.
+) -> tuple[Evaluation, Path | OutputError]:
+    """Evaluates the agent of a run, and keeps the result in its folder if that can be written.
 
     Args:
         path: the run's folder.
@@ -78,24 +135,38 @@ def evaluate_run(
         on_episode: told the number of finished episodes whenever some finish.
 
     Returns:
-        The evaluation, and the file that holds it.
+        The evaluation, and the file that holds it, or why it could not be kept.
 
     Raises:
-        InputError: there is no run, no such checkpoint, or the environments cannot be made.
+        InputError: there is no run, no such checkpoint, or the environments cannot be made, or
+            are not what the agent was trained in.
+        NotImported: its environment needs a module that has not been imported.
         TrdlabError: something is torn.
     """
     folder = RunFolder.open(path)
-    settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
-    step = checkpoint_steps(folder)[-1] if step is None and checkpoint_steps(folder) else step
+    settings = run_settings(folder)
+    check_imported(settings.env)
     use_threads(settings)
-    estimator = load(path, step)
+    step, estimator = _loaded(folder, step)
     count = episodes or settings.evaluate_episodes or 30
     chance = settings.evaluate_epsilon if epsilon is None else epsilon
     environments = make_environments(settings, num_envs=count, seed=seed)
     try:
+        fitting(environments, folder, settings.env)
         result = evaluate(estimator, environments, epsilon=chance, seed=seed, on_episode=on_episode)
     finally:
         environments.close()
     name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}.json"
-    write_json(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
-    return result, folder.evaluations / name
+    return result, _keep(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
+
+
+def _keep(path: Path, data: dict[str, Any]) -> Path | OutputError:
+    """Writes an evaluation into the folder of its run, or returns why that cannot be done."""
+    with suppress(OSError):  # some ways to copy a run leave out empty folders
+        path.parent.mkdir(exist_ok=True)
+    try:
+        check_own(path.parent)
+        write_json(path, data)
+    except OutputError as error:
+        return error
+    return path

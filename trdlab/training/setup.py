@@ -168,9 +168,7 @@ def future(settings: TrainSettings) -> Future:
     policy = "the greedy policy of the network"
     if settings.width > 1:
         policy += f" (for the first {settings.width} steps, the ε-greedy one it learned from)"
-    reward = "sign of each reward" if settings.clip_rewards else Future(policy).reward
-    ending = "a lost life, or the end of the game" if settings.life_loss_ends else "terminal states"
-    return Future(policy, reward, ending)
+    return Future(policy, settings.clip_rewards, settings.life_loss_ends)
 
 
 @dataclass(frozen=True)

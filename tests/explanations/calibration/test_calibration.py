@@ -14,15 +14,16 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Step
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations.calibration.calibration import calibrate, endings
 from trdlab.explanations.calibration.errors import blame, is_off
 from trdlab.explanations.calibration.residual import exact_tails, hidden, sufficient_horizon
 from trdlab.explanations.calibration.trust import trust
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.rollouts.episodes import Counting, Episode, collect
+from trdlab.policies import Memoryless
+from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import pool, what_followed
 from trdlab.tabular import ExactTable, exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 20)
 
@@ -49,7 +50,7 @@ def played(
     return collect(
         Given(components, axis, Future("the given policy")),
         environments,
-        policy=lambda states: table.solution.policy[states],
+        policy=Memoryless(lambda states: table.solution.policy[states]),
         epsilon=epsilon,
         seed=seed,
     )
@@ -144,7 +145,7 @@ class Scripted:
         self.now = 5
         return np.array([[5]])
 
-    def step(self, actions: Any) -> Step:
+    def step(self, actions: Any, active: Any = None) -> Step:
         self.now += 1
         over = np.array([self.now == 9])
         frames = np.array([[self.now]])
@@ -161,7 +162,10 @@ class Scripted:
 class Last:
     """Predicts the sum of the frames it sees, for action 1."""
 
-    time_axis, future = TimeAxis(0.5, 1), Future("the greedy policy")
+    time_axis = TimeAxis(0.5, 1)
+
+    def __init__(self, **counts: bool) -> None:
+        self.future = Future("the greedy policy", **counts)
 
     def decompose(self, observations: Any) -> RewardDecomposition:
         components = np.zeros((len(observations), 2, 2))
@@ -170,7 +174,8 @@ class Last:
 
 
 def test_collect_keeps_what_was_predicted_up_to_the_true_last_observation():
-    (episode,) = collect(Last(), Scripted(), counting=Counting(True, True))  # type: ignore[arg-type]
+    clipped = Last(clip_rewards=True, life_loss_ends=True)
+    (episode,) = collect(clipped, Scripted())  # type: ignore[arg-type]
     assert episode.actions.tolist() == [1, 1, 1, 1]
     assert episode.predicted[:, 0].tolist() == [5, 11, 13, 15]  # 0 + 5, 5 + 6, 6 + 7, 7 + 8
     assert episode.expected[:, 0].tolist() == [5, 11, 13, 15, 17]  # and 8 + 9 at the end

@@ -10,19 +10,17 @@ import pytest
 from by_hand import occupancy
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.environments.stack import FrameStack
+from trdlab.environments import GymEnvironments
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
 from trdlab.explanations.calibration.calibration import calibrate
 from trdlab.explanations.calibration.ceiling import ceiling, exact_ceiling
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.intervals import Estimates
 from trdlab.rollouts.branches import Branching
 from trdlab.rollouts.counterfactual import counterfactual
-from trdlab.rollouts.episodes import collect
-from trdlab.rollouts.playing import play_to
-from trdlab.tabular import ExactTable, exact, from_environment
+from trdlab.rollouts.episodes import Recording, collect
+from trdlab.tabular import ExactTable, ModelEnvironments, exact, from_environment
 
 AXIS = TimeAxis(0.95, 12)
 DRONE = Gridworld(load_map("drone").with_slip(0.2))
@@ -60,7 +58,7 @@ def test_model_environments_draw_from_the_model_and_are_restored_to_the_bit():
 
 
 def test_the_ceiling_of_an_exact_model_is_found_from_copies():
-    environments = ModelEnvironments(bridge().mdp, 300, seed=1)
+    environments = ModelEnvironments(bridge().mdp, 300, seed=101)
     branches = Branching(bridge(), copies=6, steps=300).along(environments, every=3)
     found = ceiling(branches)
     true = exact_ceiling(bridge(), occupancy(bridge()))
@@ -89,20 +87,20 @@ def test_where_a_coin_decides_the_ceiling_is_zero():
 def test_gymnasium_environments_are_copied_with_fresh_chance():
     lake = from_environment(gym.make("FrozenLake-v1"))
     table = exact(lake, TimeAxis(0.95, 3))
-    environments = CopyableGymEnvironments("FrozenLake-v1", 2, seed=0)
+    environments = GymEnvironments("FrozenLake-v1", 2, seed=0)
     environments.reset()
     copies = environments.branch(np.zeros(60, dtype=np.int64), seed=1)
     reached = copies.step(np.full(60, 2)).frames
     assert set(reached.tolist()) == {0, 1, 4}  # right, slipping up or down
     assert environments.step(np.array([2, 2])).frames.shape == (2,)  # those stay as they were
     branches = Branching(table, copies=3).along(
-        CopyableGymEnvironments("FrozenLake-v1", 12, seed=0), every=10
+        GymEnvironments("FrozenLake-v1", 12, seed=0), every=10
     )
     assert not ceiling(branches, resamples=50).deterministic
 
 
 def test_without_chance_the_ceiling_says_so():
-    cart = CopyableGymEnvironments("CartPole-v1", 12, seed=0)
+    cart = GymEnvironments("CartPole-v1", 12, seed=0)
 
     class Sway:
         time_axis, future = TimeAxis(0.9, 5), Future("the greedy policy")
@@ -131,12 +129,12 @@ def test_foils_of_an_exact_table_are_predicted_without_bias():
 def test_a_counterfactual_contrast_agrees_with_the_exact_one():
     table = exact(DRONE.mdp, AXIS)
     environments = ModelEnvironments(DRONE.mdp, 1, seed=0)
-    stack = play_to(table, environments, 0)
+    playing = Recording(table, environments).playing
     branching = Branching(table, copies=200, steps=400)
     true = (table.decomposition[0, 1] - table.decomposition[0, 0]).components
     shares = []
     for seed in range(5):
-        found = counterfactual(branching, environments, stack, 1, 0, seed=seed)
+        found = counterfactual(branching, playing, 1, 0, seed=seed)
         assert found.predicted == pytest.approx([*true, true.sum()])
         assert np.abs(found.observed.value - found.predicted).max() < 0.4
         shares.append(inside(found.observed, found.predicted))
@@ -146,12 +144,12 @@ def test_a_counterfactual_contrast_agrees_with_the_exact_one():
 def test_counterfactuals_refuse_what_is_not_there():
     table, environments = bridge(), ModelEnvironments(bridge().mdp, 1, seed=0)
     with pytest.raises(InputError, match=r"There is no step 500: the episode is over after \d+"):
-        play_to(table, environments, 500)
-    stack = FrameStack(environments.reset(), None, "reset")
+        Recording(table, environments).play_to(500)
+    playing = Recording(table, environments).playing
     with pytest.raises(InputError, match="both 1"):
-        counterfactual(Branching(table), environments, stack, 1, 1)
+        counterfactual(Branching(table), playing, 1, 1)
     with pytest.raises(InputError, match=r"no action 7.*0 to 3"):
-        counterfactual(Branching(table), environments, stack, 7, 1)
+        counterfactual(Branching(table), playing, 7, 1)
     with pytest.raises(InputError, match="reach 12 steps"):
         Branching(table, steps=5)
     with pytest.raises(InputError, match="at least 2 of both"):

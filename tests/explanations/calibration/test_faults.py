@@ -13,7 +13,6 @@ from trdlab.bellman import target
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations.calibration.consistency import Audit, audit
 from trdlab.explanations.calibration.errors import blame
 from trdlab.explanations.calibration.faults import (
@@ -25,9 +24,11 @@ from trdlab.explanations.calibration.faults import (
     discount_exponent,
 )
 from trdlab.gridworld import Gridworld, load_map
+from trdlab.policies import Memoryless
 from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import pool
 from trdlab.tabular import MDP, exact, learn
+from trdlab.tabular.episodes import ModelEnvironments
 
 SINGLE, PAIRS = TimeAxis(0.95, 12), TimeAxis(0.95, 6, 2)
 GREEDY = Future("the greedy policy")
@@ -110,7 +111,7 @@ def test_a_reward_shifted_by_one_step_is_named(name: str, seed: int):
     episodes = collect(
         Given(components, SINGLE, GREEDY),
         ModelEnvironments(world(name), 200, seed=seed, time_limit=100),
-        policy=lambda states: policy[states],
+        policy=Memoryless(lambda states: policy[states]),
         seed=seed,
     )
     (fault,) = diagnosed(episodes)

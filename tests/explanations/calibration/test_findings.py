@@ -13,7 +13,6 @@ import mutants
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import UnsupportedSentenceError
 from trdlab.explanations.calibration.calibration import Calibration, Endings, State
 from trdlab.explanations.calibration.ceiling import Ceiling
@@ -28,11 +27,13 @@ from trdlab.explanations.calibration.trust import trust
 from trdlab.explanations.calibration.verdicts import TrustFinding
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.intervals import Estimates
+from trdlab.policies import Memoryless
 from trdlab.rollouts.branches import Branching
 from trdlab.rollouts.episodes import collect
 from trdlab.show.plots.calibration import plot_trust
 from trdlab.statistics import Estimate
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 WORDS = {
     "can be": "cannot be",
@@ -223,7 +224,7 @@ def test_the_first_sentence_says_how_far_and_the_second_why_no_further():
     components[..., 8:] = np.random.default_rng(0).normal(size=components[..., 8:].shape)
     worse = replace(table, decomposition=RewardDecomposition(components, axis))
     play = ModelEnvironments(mdp, 40, seed=0, time_limit=60)
-    episodes = collect(worse, play, policy=lambda states: table.solution.policy[states])
+    episodes = collect(worse, play, policy=Memoryless(lambda states: table.solution.policy[states]))
     assert trust_sentences(judge(table.future, episodes))[:2] == [
         "The forecast can be trusted to t+7.",
         "From t+8 on it is no better than a constant guess.",

@@ -25,6 +25,7 @@ from trdlab.explanations.comparison.findings import comparison_findings
 from trdlab.explanations.comparison.comparison import Comparison, compared
 from trdlab.explanations.comparison.states import Visits
 from trdlab.intervals import Estimates
+from trdlab.policies import Memoryless
 from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page
 from trdlab.show.comparison_data import comparison_to_dict
 from trdlab.show.plots.comparison import comparison_figure
@@ -69,7 +70,9 @@ def reports() -> tuple[TrustReport | None, ...]:
         return replace(agent, estimator=worse)
 
     nothing = gridworld_agent("ledge,exploring_starts=true", axis)
-    still = replace(nothing, policy=lambda states: np.eye(4)[np.zeros(len(states), dtype=int)])
+    still = replace(
+        nothing, policy=Memoryless(lambda states: np.eye(4)[np.zeros(len(states), dtype=int)])
+    )
     zero = RewardDecomposition(np.zeros((8, 4, 4)), axis)
     table = nothing.estimator
     assert isinstance(table, ExactTable)
@@ -136,7 +139,7 @@ def comparisons(draw: st.DrawFn) -> Comparison:
         cut=draw(st.sampled_from([0, 0, 7])),
     )
     one, other = draw(st.permutations(range(7)))[:2]
-    futures = Future("the optimal policy"), Future("the greedy policy", "sign of each reward")
+    futures = Future("the optimal policy"), Future("the greedy policy", clip_rewards=True)
     return compared(
         visits,
         names=("one", "other"),

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 import mutants
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import UnsupportedSentenceError
 from trdlab.explanations.episode.played import Played, StoryClaim
 from trdlab.explanations.episode.promises import foreseen
@@ -28,6 +27,7 @@ from trdlab.show.story import (
     story_to_dict,
 )
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 NAMES = ("up", "down", "FIRE", "move left")
 WORDS = {

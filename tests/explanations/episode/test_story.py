@@ -10,7 +10,6 @@ from by_hand import episode
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.promises import (
     BrokenPromise,
@@ -33,6 +32,7 @@ from trdlab.explanations.episode.surprises import (
 from trdlab.gridworld import Gridworld, load_map, map_names
 from trdlab.rollouts.episodes import collect
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.5, 4)
 

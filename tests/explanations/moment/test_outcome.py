@@ -14,6 +14,7 @@ from trdlab.explanations.assessment import Copying, assess, try_out
 from trdlab.explanations.moment.outcome import Trial, TrialClaim, trial_findings
 from trdlab.explanations.moment.trials import TEMPLATES, check_trial, trial_sentences
 from trdlab.intervals import Estimates
+from trdlab.policies import Memoryless
 from trdlab.rollouts.counterfactual import Counterfactual
 from trdlab.tabular import ExactTable
 
@@ -116,7 +117,9 @@ def test_what_differs_by_rounding_was_not_forecast_to_differ():
 
 def test_without_explicit_components_it_is_not_seen_what_came_of_copies_that_go_on():
     agent = gridworld_agent("drone", TimeAxis(0.95, 0))
-    stuck = replace(agent, policy=lambda states: np.tile([1.0, 0.0, 0.0, 0.0], (len(states), 1)))
+    stuck = replace(
+        agent, policy=Memoryless(lambda states: np.tile([1.0, 0.0, 0.0, 0.0], (len(states), 1)))
+    )
     trial = try_out(stuck, "left", "up", copies=3)
     assert trial is not None
     assert not trial.found.whole

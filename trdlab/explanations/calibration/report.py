@@ -38,6 +38,7 @@ class TrustReport:
             taken; None where states were not copied, or where there is no other action.
         faults: what is surely implemented wrongly.
         seconds_per_step: how long a step takes as people play, if that is known.
+        lost: why there is no ceiling and there are no foils though they were asked for, else empty.
     """
 
     future: Future
@@ -54,6 +55,7 @@ class TrustReport:
     foils: Calibration | None
     faults: tuple[Fault, ...]
     seconds_per_step: float | None = None
+    lost: str = ""
 
     @property
     def foil_trust(self) -> Trust | None:

@@ -7,6 +7,7 @@ from typing import Any
 from trdlab.agents.agent import AXIS, Agent, find_agent
 from trdlab.agents.models import is_model
 from trdlab.agents.places import seen
+from trdlab.environments.naming import is_numbered
 from trdlab.errors import InputError
 from trdlab.explanations.assessment import assess
 from trdlab.explanations.calibration.report import TrustReport
@@ -153,8 +154,3 @@ def _doable(agent: Agent, pair: tuple[Agent, Agent]) -> str:
     named = all(not is_numbered(of.action_names) for of in pair)
     count = len(agent.action_names)
     return f"the actions {', '.join(agent.action_names)}" if named else f"{count} actions"
-
-
-def is_numbered(action_names: Sequence[str]) -> bool:
-    """Returns whether actions have numbers for names."""
-    return all(name == f"action {i}" for i, name in enumerate(action_names))

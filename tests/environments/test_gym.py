@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from trdlab.environments import Environments, GymEnvironments, NotReproducible, Step
+from trdlab.environments.naming import is_numbered
 from trdlab.environments.stack import FrameStack, observation_space
 from trdlab.errors import InputError, TrdlabError
 from trdlab.gridworld import Gridworld, load_map
@@ -159,7 +160,8 @@ def test_a_saved_state_is_for_the_same_environments():
 
 def test_what_is_known_of_an_environment():
     cartpole = GymEnvironments("CartPole-v1", 2, seed=0)
-    assert (cartpole.num_actions, cartpole.first_action, cartpole.action_names) == (2, 0, ())
+    assert (cartpole.num_actions, cartpole.first_action) == (2, 0)
+    assert cartpole.action_names == ("action 0", "action 1")
     assert (cartpole.time_limit, cartpole.frames_per_second, cartpole.frame_skip) == (500, 50, 1)
     short = GymEnvironments("CartPole-v1", seed=0, env_arguments={"max_episode_steps": 7})
     assert short.time_limit == 7
@@ -167,8 +169,17 @@ def test_what_is_known_of_an_environment():
     assert acted(short, 7)[-1].truncated.all()
     drone = GymEnvironments("trdlab/DroneGridworld-v0", seed=0)
     assert drone.action_names == ("up", "down", "left", "right")
-    named = GymEnvironments("Counter-v0", seed=0, env_arguments={"names": ("a", "b")})
-    assert (named.first_action, named.action_names) == (5, ())  # two names for three actions
+
+
+@pytest.mark.parametrize("names", [("a", "b"), ("a", "b", "a"), ()])  # of three actions
+def test_actions_without_names_are_called_by_the_numbers_of_the_environment(names):
+    counter = GymEnvironments("Counter-v0", seed=0, env_arguments={"names": names})
+    assert (counter.num_actions, counter.first_action) == (3, 5)
+    assert counter.action_names == ("action 5", "action 6", "action 7")
+    assert is_numbered(counter.action_names)
+    counter.reset()
+    assert not counter.step(np.array([1])).terminated  # action 6
+    assert counter.step(np.array([2])).terminated  # action 7
 
 
 def test_grey_pictures_are_single_frames_and_coloured_ones_channels_first():

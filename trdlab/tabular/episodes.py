@@ -1,18 +1,18 @@
-"""Environments whose states can be copied, to see what else could have followed."""
+"""Episodes drawn from an exact model."""
 
 from collections.abc import Mapping
-from copy import copy, deepcopy
+from copy import copy
 from typing import Any, Self
 
 import gymnasium as gym
 import numpy as np
 
-from trdlab.arrays import FloatArray, IntArray
-from trdlab.environments import NotCopyable, Padding, Step
-from trdlab.environments.gym import GymEnvironments
-from trdlab.environments.history import Histories, checked_actions
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.environments.history import checked_actions
+from trdlab.environments.naming import numbered
+from trdlab.environments.protocol import Padding, Step
 from trdlab.errors import InputError
-from trdlab.tabular import MDP
+from trdlab.tabular.mdp import MDP
 
 
 class ModelEnvironments:
@@ -24,7 +24,7 @@ class ModelEnvironments:
         seed: where all chance comes from.
         starts: `[S]`, how likely episodes begin in each state; without it in `mdp.start`.
         time_limit: the steps after which an episode is truncated.
-        action_names: A names, if the actions have some.
+        action_names: A names; by default their numbers.
 
     Raises:
         InputError: there is no environment, or the starts are no distribution over the states.
@@ -36,6 +36,7 @@ class ModelEnvironments:
     """
 
     first_action = 0
+    shared_chance = False
     stack: int | None = None
     padding: Padding = "reset"
     frame_skip = 1
@@ -61,7 +62,7 @@ class ModelEnvironments:
             )
         self.mdp, self.num_envs, self.num_actions = mdp, num_envs, mdp.num_actions
         self.observation_space: gym.Space[Any] = gym.spaces.Discrete(mdp.num_states)
-        self.action_names, self.time_limit = action_names, time_limit
+        self.action_names, self.time_limit = action_names or numbered(mdp.num_actions), time_limit
         self._rng, self._begin = np.random.default_rng(seed), np.cumsum(begin)
         self._cumulative = np.cumsum(mdp.probabilities)  # [K], over all rows
         self._before = np.concatenate([[0.0], self._cumulative])[mdp.offsets]  # [S·A + 1]
@@ -73,24 +74,32 @@ class ModelEnvironments:
         self._states, self._elapsed = self._first(self.num_envs), np.zeros_like(self._elapsed)
         return self._states.copy()
 
-    def step(self, actions: IntArray) -> Step:
+    def step(self, actions: IntArray, active: BoolArray | None = None) -> Step:
         """Takes actions `[B]`; where an episode ends, the next one begins in the same call.
+
+        Args:
+            actions: `[B]`.
+            active: `[B]`, which environments act; by default all.
 
         Raises:
             InputError: there are not B actions, or one does not exist.
         """
         actions = checked_actions(actions, self.num_envs, self.num_actions)
-        drawn = self._drawn(self._states * self.num_actions + actions)  # [B], transitions
-        frames, terminated = self.mdp.next_states[drawn], self.mdp.terminated[drawn]
-        self._elapsed += 1
-        late = self._elapsed == (self.time_limit or -1)
+        acts = np.ones(self.num_envs, dtype=np.bool_) if active is None else active
+        frames, rewards = self._states.copy(), np.zeros(self.num_envs)
+        terminated, late = np.zeros_like(acts), np.zeros_like(acts)
+        drawn = self._drawn((self._states * self.num_actions + actions)[acts])  # [≤ B], transitions
+        frames[acts], rewards[acts] = self.mdp.next_states[drawn], self.mdp.rewards[drawn]
+        terminated[acts] = self.mdp.terminated[drawn]
+        self._elapsed[acts] += 1
+        late[acts] = self._elapsed[acts] == (self.time_limit or -1)
         ended = terminated | late
         self._states = frames.copy()
         self._states[ended] = self._first(int(ended.sum()))
         self._elapsed[ended] = 0
         return Step(
             frames=frames,
-            rewards=self.mdp.rewards[drawn],
+            rewards=rewards,
             terminated=terminated,
             truncated=late & ~terminated,
             life_lost=np.zeros(self.num_envs, dtype=np.bool_),
@@ -129,30 +138,3 @@ class ModelEnvironments:
         drawn = np.searchsorted(self._cumulative, level, side="right")
         first, last = self.mdp.offsets[rows], self.mdp.offsets[rows + 1] - 1
         return np.asarray(np.clip(drawn, first, last))  # rounding must not lead into another row
-
-
-class CopyableGymEnvironments(GymEnvironments):
-    """Gymnasium environments that are copied whole, with fresh chance in each copy.
-
-    The copies take their chance from `np_random`, as Gymnasium asks of environments. One whose
-    chance comes from elsewhere makes copies that all do the same (see `Ceiling.deterministic`).
-    """
-
-    def branch(self, which: IntArray, seed: int) -> Self:
-        """Returns copies of the environments `which [B′]`; their `state_dict` cannot be asked for.
-
-        Raises:
-            NotCopyable: an environment cannot be copied.
-        """
-        other, seeds = copy(self), np.random.SeedSequence(seed).spawn(len(which))
-        try:
-            envs = [deepcopy(self._envs[env]) for env in which]
-        except (TypeError, AttributeError, NotImplementedError, RuntimeError) as error:
-            raise NotCopyable(
-                f"{self.env_id} cannot be copied ({error}).", "Ask for no ceiling and no foils."
-            ) from error
-        for env, words in zip(envs, seeds, strict=True):
-            env.unwrapped.np_random = np.random.default_rng(words)
-        other._envs, other.num_envs = envs, len(envs)
-        other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
-        return other

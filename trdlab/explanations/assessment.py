@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trdlab.arrays import FloatArray
 from trdlab.agents.agent import Agent
+from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition
 from trdlab.environments import NotCopyable
 from trdlab.errors import InputError

@@ -48,6 +48,7 @@ class Explanation(Printable):
         story: of the whole episode; None where it was not asked for.
         max_steps: after which episodes were cut off, if not before; None for never.
         missing: what is not known, and why, in sentences.
+        state: the number of the state that the moment is in, if its agent has a model.
     """
 
     agent: Agent
@@ -60,6 +61,7 @@ class Explanation(Printable):
     story: Story | None = None
     max_steps: int | None = None
     missing: tuple[str, ...] = ()
+    state: int | None = None
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -146,13 +148,15 @@ def explain(
     if "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
     copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
-    choice, trial, story, report = None, None, None, None
+    choice, state, trial, story, report = None, None, None, None, None
     missing: list[str] = []
     with agent.begin(seed=seed, max_steps=limit) as recording:
         if {"forecast", "contrast"} & set(wanted):
             recording.play_to(step)
             names = (None if name is None else agent.action(name) for name in (action, foil))
             choice = moment_of_play(agent, recording.playing).choice(*names)
+            if agent.world is not None:
+                state = int(recording.playing.stack.observations[0])
         if "contrast" in parts and choice is not None and len(agent.action_names) < 2:
             raise InputError("There is no other action to hold it against.", "Ask for a forecast.")
         if "contrast" in wanted and choice is not None and choice.foil is not None:
@@ -181,6 +185,7 @@ def explain(
         story=story,
         max_steps=limit,
         missing=tuple(missing),
+        state=state,
     )
 
 

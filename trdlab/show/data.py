@@ -9,6 +9,7 @@ from trdlab.explanations.moment.telling import in_brief, sections
 from trdlab.explanations.rules import plain_data
 from trdlab.explanations.sections import Section
 from trdlab.explanations.solved import SolvedState
+from trdlab.show.document import late
 from trdlab.show.scenes import scene_of
 from trdlab.time_axis import TimeAxis
 
@@ -20,7 +21,7 @@ def data(thing: Any) -> dict[str, Any]:
     Raises:
         TypeError: there is no such form of it.
     """
-    raise TypeError(f"{type(thing).__name__} has no form as plain data")
+    return late(data, thing)
 
 
 @data.register
@@ -30,7 +31,7 @@ def _(solved: SolvedState) -> dict[str, Any]:
         "schema": scene.schema,
         **scene.world,
         "time_axis": axis_data(solved.table.time_axis),
-        "future": asdict(choice.moment.future),
+        "future": choice.moment.future.to_dict(),
         "state": {"index": solved.state, **scene.state},
         "actions": actions_data(choice.moment),
         "action": choice.action,

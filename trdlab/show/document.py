@@ -1,8 +1,10 @@
 """Documents: what a page holds, whatever it is rendered to; one maker for each noun."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import singledispatch
-from typing import Any
+from importlib import import_module
+from typing import Any, TypeVar
 
 from trdlab.explanations.moment.moment import Choice
 from trdlab.explanations.moment.telling import in_brief, sections
@@ -11,6 +13,8 @@ from trdlab.explanations.solved import SolvedState
 from trdlab.formatting import plain
 from trdlab.show.scenes import scene_of
 from trdlab.time_axis import TimeAxis
+
+T = TypeVar("T")
 
 _MOST_ERROR = 1e-6  # of the largest Q-value, beyond which it is not called exact
 
@@ -26,9 +30,11 @@ class Document:
         legend: what its symbols mean.
         notes: what the numbers leave out.
         choice: whose actions are shown as a table.
+        grid: another table: its heading, and its rows.
         answer: the few sentences that matter most.
         sections: all that there is to tell.
         check: what was checked of the numbers, and whether it is well.
+        folded: whether the sections are told only to who asks for details.
     """
 
     heading: str
@@ -37,9 +43,11 @@ class Document:
     legend: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     choice: Choice | None = None
+    grid: tuple[tuple[str, ...], ...] = ()
     answer: tuple[str, ...] = ()
     sections: tuple[Section, ...] = ()
     check: tuple[str, bool] | None = None
+    folded: bool = True
 
 
 @singledispatch
@@ -49,7 +57,22 @@ def document(thing: Any) -> Document:
     Raises:
         TypeError: there is none about such a thing.
     """
-    raise TypeError(f"there is no page about {type(thing).__name__}")
+    return late(document, thing)
+
+
+def late(render: Callable[[Any], T], thing: Any) -> T:
+    """Returns what a renderer makes of a noun whose renderings had not been imported yet.
+
+    Those of agents need Gymnasium, and a solved gridworld does without.
+
+    Raises:
+        TypeError: there is no such rendering.
+    """
+    import_module("trdlab.show.agents")
+    found: Callable[[Any], T] = render.dispatch(type(thing))  # type: ignore[attr-defined]
+    if found is render.dispatch(object):  # type: ignore[attr-defined]
+        raise TypeError(f"{type(thing).__name__} has no such rendering")
+    return found(thing)
 
 
 @document.register

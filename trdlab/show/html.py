@@ -1,10 +1,9 @@
 """Documents as a page of HTML that stands alone: for notebooks, and for reports."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
-from trdlab.explanations.moment.moment import Choice
 from trdlab.show.document import Document, document
 from trdlab.show.text import table_cells
 
@@ -35,7 +34,9 @@ def _parts(page: Document) -> Iterator[str]:
         yield f"<pre>{escape(page.drawing)}\n\n{escape(legend)}</pre>"
     yield from (f'<p class="about">{escape(note)}</p>' for note in page.notes)
     if page.choice is not None and not page.choice.moment.is_over:
-        yield _table(page.choice)
+        yield _table(table_cells(page.choice))
+    if page.grid:
+        yield _table(page.grid)
     for i, sentence in enumerate(page.answer):
         said = escape(sentence)
         yield f"<p><strong>{said}</strong></p>" if i == 0 else f"<p>{said}</p>"
@@ -49,8 +50,8 @@ def _parts(page: Document) -> Iterator[str]:
         yield f'<p class="about">{escape("✓ " * page.check[1] + page.check[0])}</p>'
 
 
-def _table(choice: Choice) -> str:
-    heading, *rows = table_cells(choice)
+def _table(grid: Sequence[Sequence[str]]) -> str:
+    heading, *rows = grid
     head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in heading)
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>" for cells in rows

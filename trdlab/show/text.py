@@ -57,7 +57,9 @@ def _lines(page: Document, width: int, *, details: bool) -> Iterator[Text]:
     yield Text()
     if page.choice is not None and not page.choice.moment.is_over:
         yield from (*action_table(page.choice, width), Text())
-    if details:
+    if page.grid:
+        yield from (*grid_lines(page.grid, width), Text())
+    if details or not page.folded:
         for section in page.sections:
             yield from wrapped(section.heading, width, "bold")
             for sentence in section.sentences:
@@ -114,6 +116,26 @@ def action_table(choice: Choice, width: int = WIDTH) -> list[Text]:
                 for cells, style in zip(table, ["bold", *(row.style for row in rows)], strict=True)
             ]
     return [line for row in rows for line in _stacked(row, moment, width)]
+
+
+def grid_lines(grid: Sequence[Sequence[str]], width: int) -> list[Text]:
+    """Returns a table, its heading first; each row by itself where the page is too narrow."""
+    widths = [max(map(len, column)) for column in zip(*grid, strict=True)]
+    if sum(widths) + len(_GAP) * (len(widths) - 1) <= width:
+        lines = [
+            _GAP.join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])])
+            for row in grid
+        ]
+        return [Text(line, style="" if i else "bold") for i, line in enumerate(lines)]
+    heading, *rows = grid
+    return [
+        line
+        for name, *cells in rows
+        for line in (
+            Text(name, style="bold"),
+            *(Text(f"  {of}  {cell}") for of, cell in zip(heading[1:], cells, strict=True)),
+        )
+    ]
 
 
 def table_cells(choice: Choice) -> list[list[str]]:

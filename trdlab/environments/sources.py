@@ -10,7 +10,8 @@ from gymnasium.envs.registration import EnvSpec
 
 from trdlab.environments.answers import check_reset
 from trdlab.environments.aside import aside
-from trdlab.environments.copies import Env, begun, kept_luck, trace
+from trdlab.environments.chance import kept_luck
+from trdlab.environments.copies import Env, begun, trace
 from trdlab.environments.making import make_environment
 from trdlab.environments.protocol import NotParallel
 from trdlab.environments.spaces import discrete_actions

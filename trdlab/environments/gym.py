@@ -136,10 +136,12 @@ class GymEnvironments:
     def branch(self, which: IntArray, seed: int) -> Self:
         """Returns copies of the environments `which [B′]`, each with a chance of its own.
 
-        They are deep copies, where these have proved to be copies (see `prove`); otherwise seed and
-        actions are played again in new environments, which must show the same. In either case their
-        generators of chance are seeded anew (see `generators`). Their `state_dict` cannot be asked
-        for.
+        They are deep copies where these have proved to be copies: another environment of this kind
+        is stepped as its copy was, and does the same. Elsewhere seed and actions are played again
+        in new environments, which must show the same. Then every generator of chance that a copy
+        holds is seeded anew: `np_random`, and those of NumPy and Python in attributes and in what
+        these hold. Where others decide, out of reach, `shared_chance` says so as far as that was
+        seen. The `state_dict` of copies cannot be asked for; close them where they hold something.
 
         Raises:
             NotCopyable: neither gives a copy.

@@ -83,7 +83,7 @@ class Source:
                 raise
             raise NotParallel(
                 f"There can be {len(beside) + len(envs)} of {self.name} at a time: {error.cause}",
-                "Play its episodes one after another.",
+                "Ask for no more.",
             ) from error
         return envs
 

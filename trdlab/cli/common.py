@@ -171,7 +171,8 @@ def print_line(line: str, style: str = "") -> None:
 
 
 def _print(shown: "Text") -> None:
-    from trdlab.show.text import plain_ascii
+    from trdlab.show.text import columns, plain_ascii
 
     console, ascii_only = new_console()
+    console.width = columns()  # where a terminal says it has none, rich prints nothing
     console.print(plain_ascii(shown) if ascii_only else shown, soft_wrap=True)

@@ -12,7 +12,7 @@ from trdlab.gridworld.ansi import DRONE, ansi
 from trdlab.tabular.named import TabularWorld
 
 _LIMIT = "The environment cuts episodes off after {} steps; the model does not."
-_NEVER = "Episodes never come to this state."
+_NEVER = "Episodes are over in this state, or never come to it."
 
 
 @dataclass(frozen=True)

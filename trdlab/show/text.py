@@ -76,7 +76,12 @@ def wrapped(line: str, width: int, style: str = "", *, indent: int = 0) -> list[
     """Returns a paragraph as lines no longer than the page is wide."""
     space = " " * indent
     parts = textwrap.wrap(
-        line, width, initial_indent=space, subsequent_indent=space, break_on_hyphens=False
+        line,
+        width,
+        initial_indent=space,
+        subsequent_indent=space,
+        break_on_hyphens=False,
+        break_long_words=False,  # a path is to be copied whole
     )
     return [Text(part, style=style) for part in parts] or [Text()]
 
@@ -107,14 +112,16 @@ def action_table(choice: Choice, width: int = WIDTH) -> list[Text]:
     left out; where the page is too narrow for that, the numbers of an action stand below its name.
     """
     moment, rows = choice.moment, _rows(choice)
-    for shown in range(min(_MOST_COMPONENTS, moment.time_axis.num_components), 1, -1):
-        table = [_cells(row, moment, shown) for row in [None, *rows]]
-        widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-        if sum(widths) + len(_GAP) * (len(widths) - 1) <= width:
-            return [
-                Text(_GAP.join(_aligned(cells, widths)).rstrip(), style=style)
-                for cells, style in zip(table, ["bold", *(row.style for row in rows)], strict=True)
-            ]
+    most = min(_MOST_COMPONENTS, moment.time_axis.num_components)
+    for shown in range(most, 1, -1):
+        cells = [_cells(row, moment, shown) for row in rows]
+        for labels in (*range(shown, 1, -1), 0):
+            table = [_heading(moment, labels), *cells]
+            widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+            if sum(widths) + len(_GAP) * (len(widths) - 1) <= width:
+                styles = ["bold", *(row.style for row in rows)]
+                lines = (_GAP.join(_aligned(cells, widths)).rstrip() for cells in table)
+                return [Text(line, style=style) for line, style in zip(lines, styles, strict=True)]
     return [line for row in rows for line in _stacked(row, moment, width)]
 
 
@@ -140,8 +147,8 @@ def grid_lines(grid: Sequence[Sequence[str]], width: int) -> list[Text]:
 
 def table_cells(choice: Choice) -> list[list[str]]:
     """Returns the cells of the table of actions, its heading first."""
-    shown = choice.time_axis.num_components
-    return [_cells(row, choice.moment, shown) for row in [None, *_rows(choice)]]
+    moment, shown = choice.moment, choice.time_axis.num_components
+    return [_heading(moment, shown), *(_cells(row, moment, shown) for row in _rows(choice))]
 
 
 @dataclass(frozen=True)
@@ -183,18 +190,20 @@ def _rows(choice: Choice) -> list[_Row]:
     return rows
 
 
-def _cells(row: _Row | None, moment: Moment, shown: int) -> list[str]:
-    """Returns the cells of a row, or of the heading; of its components only so many are shown."""
-    totals = moment.totals is not None
-    if row is None:
-        labels = ", ".join(_shortened(moment.time_axis.labels, shown))
-        return ["action", f"components: {labels}", "Q", *["total"] * totals, ""]
+def _heading(moment: Moment, shown: int) -> list[str]:
+    """Returns the cells of the heading; of the labels of its components only so many are shown."""
+    labels = f": {', '.join(_shortened(moment.time_axis.labels, shown))}" if shown else ""
+    return ["action", f"components{labels}", "Q", *["total"] * (moment.totals is not None), ""]
+
+
+def _cells(row: _Row, moment: Moment, shown: int) -> list[str]:
+    """Returns the cells of a row; of its components only so many are shown."""
     parts = _shortened([number(float(c), row.decimals) for c in row.components], shown)
     return [
         row.name,
         f"[{', '.join(parts)}]",
         number(row.q_value, row.decimals),
-        *[amount(row.total)] * totals,
+        *[amount(row.total)] * (moment.totals is not None),
         row.note,
     ]
 

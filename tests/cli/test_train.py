@@ -277,7 +277,7 @@ def test_an_evaluation_that_would_never_return_is_cut_off(trdlab, tmp_path):
     words = ("train", "gym", "CliffWalking-v1", *SMALL, "--out", tmp_path / "run")
     code, out, _ = trdlab(*words)
     assert code == 0
-    assert "3 of 3 were cut off after 1,000 steps" in " ".join(out.split())
+    assert "3 of 3 were cut off at step 1,000" in " ".join(out.split())
     code, out, err = trdlab("evaluate", tmp_path / "run", "--max-steps", 7, "--json")
     data = json.loads(out)
     assert (code, data["lengths"], data["max_steps"]) == (0, [7, 7, 7], 7)

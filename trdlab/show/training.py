@@ -55,7 +55,7 @@ def _cut_off(evaluation: Evaluation) -> str:
     told = f"{cut} of {len(evaluation.lengths)} were cut off"
     if not cut or limit is None or (evaluation.lengths[evaluation.truncated] != limit).any():
         return told if cut else ""
-    return f"{told} after {limit:,} steps"
+    return f"{told} at step {limit:,}"
 
 
 def runs_table(runs: Sequence[RunSummary], *, ascii_only: bool = False) -> RenderableType:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from trdlab.deep.settings import Kind
     from trdlab.deep.trainer import TrainMetrics
     from trdlab.explanations.calibration.report import TrustReport
-    from trdlab.explanations.comparison.report import Comparison
-    from trdlab.explanations.explained import Explained
+    from trdlab.explanations.comparison.comparison import Comparison
+    from trdlab.explanations.explanation import Explanation
     from trdlab.policies import Policy
     from trdlab.rollouts.playing import Watch
 
@@ -228,7 +228,7 @@ def explain(
     max_steps: int | None = None,
     watch: "Watch | None" = None,
     **how: Any,
-) -> "Explained":
+) -> "Explanation":
     """Explains what an agent expects at a step of an episode of its own, and how far to trust that.
 
     Args:
@@ -249,11 +249,12 @@ def explain(
     Raises:
         InputError: this is no agent, or there is no such step, action or part.
     """
-    from trdlab.explanations.explained import explain_agent, parse_parts
+    from trdlab.explanations.explanation import explain as explaining
+    from trdlab.explanations.explanation import parse_parts
     from trdlab.rollouts.playing import unwatched
 
     wanted = parse_parts(parts)
-    return explain_agent(
+    return explaining(
         _agent(agent, env, **how),
         wanted,
         seed=seed,

@@ -23,8 +23,9 @@ from rich.console import Console
 
 from trdlab.cli import main
 from trdlab.cli.options import flag
-from trdlab.cli.progress import TrainingProgress, stopping
+from trdlab.cli.progress import EpisodeProgress, TrainingProgress, stopping
 from trdlab.deep.presets import PRESETS, preset
+from trdlab.rollouts.playing import Progress
 from trdlab.runs import RunFolder, checkpoint_steps
 from trdlab.training.loading import load
 
@@ -259,7 +260,7 @@ def test_an_evaluation_as_json(trdlab, trained):
     code, out, err = trdlab("evaluate", trained, "--episodes", 2, "--seed", 3, "--json")
     assert code == 0
     data = json.loads(out)
-    assert data["schema"] == "trdlab.rollouts.evaluation/1"
+    assert data["schema"] == "trdlab.evaluation/1"
     assert (data["episodes"], data["seed"], len(data["returns"])) == (2, 3, 2)
     kept = Path(err.removeprefix("Kept: ").strip())
     assert json.loads(kept.read_text()) == {"agent_steps": 120, **data}
@@ -270,6 +271,23 @@ def test_an_evaluation_as_json(trdlab, trained):
     code, _, err = trdlab("evaluate", trained, "--epsilon", 2)
     assert code == 2
     assert "Invalid value for '--epsilon'" in err
+
+
+def test_an_evaluation_that_would_never_return_is_cut_off(trdlab, tmp_path):
+    words = ("train", "gym", "CliffWalking-v1", *SMALL, "--out", tmp_path / "run")
+    code, out, _ = trdlab(*words)
+    assert code == 0
+    assert "3 of 3 were cut off at step 1,000" in " ".join(out.split())
+    code, out, err = trdlab("evaluate", tmp_path / "run", "--max-steps", 7, "--json")
+    data = json.loads(out)
+    assert (code, data["lengths"], data["max_steps"]) == (0, [7, 7, 7], 7)
+    assert err.endswith("seed-1000-max-steps-7.json\n")
+    assert len(list((tmp_path / "run" / "evaluations").iterdir())) == 2
+
+
+def test_the_environments_own_limit_is_enough(trdlab, trained):
+    _, out, _ = trdlab("evaluate", trained, "--json")
+    assert json.loads(out)["max_steps"] is None
 
 
 def test_the_list_of_runs(trdlab, trained, tmp_path):
@@ -391,6 +409,20 @@ def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
         "40,100 of 100,000 steps, score –, loss –",
         "42,100 of 100,000 steps, 200/s, score –, loss –",
         "44,100 of 100,000 steps, 200/s, score 195, loss 0.0123",
+    ]
+
+
+def test_episodes_are_told_of_in_a_pipe_too(monkeypatch):
+    now = [1000.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    console = Console(file=io.StringIO(), width=80)
+    with EpisodeProgress(console) as progress:
+        for step in range(1, 45):
+            now[0] += 0.5
+            progress.on_progress(Progress("episodes to score", step // 10, 30, 100 * step))
+    assert console.file.getvalue().splitlines() == [  # type: ignore[attr-defined]
+        "Playing episodes to score: step 2,000, 2 of 30 are over",
+        "Playing episodes to score: step 4,000, 4 of 30 are over",
     ]
 
 

@@ -113,7 +113,7 @@ def test_one_at_a_time_plays_one_after_another():
         make(3, 0)
     assert str(refusal.value) == (
         "There can be 1 of Port at a time: Port makes no environment (RuntimeError: the port is in "
-        "use). Play its episodes one after another."
+        "use). Ask for no more."
     )
     assert not Port.held  # the first one was closed again
     starts = [batch.reset()[:, 1].tolist() for batch in in_batches(make, 3, seed=0)]

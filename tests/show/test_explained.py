@@ -6,15 +6,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from trdlab.explanations.explained import Explained, Part, parse_parts
+from trdlab.explanations.moment.sentences import UnsupportedSentenceError
+from trdlab.show.explained import check_explained, summary, to_dict
 
 from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations import Moment, assess, explain, explain_agent
-from trdlab.explanations.explained import Explained, Part, parse_parts
-from trdlab.explanations.moment.sentences import UnsupportedSentenceError
-from trdlab.show.explained import check_explained, summary, to_dict
 from trdlab.show.plots.explained import (
     moment_figure,
     part_figure,

@@ -12,20 +12,22 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.wrappers import FrameStackObservation
+from trdlab.explanations.moment.sentences import check, sentences
 
 import trdlab
 from trdlab.cli import main
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
+from trdlab.environments import Environments, NotParallel
 from trdlab.environments.interface import Interface
 from trdlab.errors import InputError, NotImported
 from trdlab.estimator import Estimator, Future
 from trdlab.explanations import explain, moment_of
-from trdlab.explanations.moment.sentences import check, sentences
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs import RunFolder, load_checkpoint
 from trdlab.training.loading import evaluate_run, load
 from trdlab.training.run import begin, carry_on
+from trdlab.training.setup import make_environments
 from trdlab.wrappers import TemporalRewardDecomposition, VectorTemporalRewardDecomposition
 
 DRONE = "trdlab/DroneGridworld-v0"
@@ -132,18 +134,33 @@ def test_in_explanations(tmp_path, lines, future):
 
 def test_an_evaluation_is_kept_with_what_it_was_made_with(drone):
     told = []
-    result, path = evaluate_run(drone, on_episode=told.append)
+    result, path = evaluate_run(drone, watch=told.append)
     assert path.parent == drone / "evaluations"
     kept = json.loads(path.read_text())
     assert kept == {"agent_steps": 300, **result.to_dict()}
     assert (kept["episodes"], kept["epsilon"], kept["seed"]) == (5, 0.1, 1000)
-    assert told[-1] == 5
+    assert (told[-1].finished, told[-1].episodes) == (5, 5)
     again, same_path = evaluate_run(drone)
     assert (same_path, again.to_dict()) == (path, result.to_dict())
     _, other = evaluate_run(drone, episodes=3, epsilon=1.0, seed=4, step=200)
     assert other != path
     kept = json.loads(other.read_text())
     assert [kept[key] for key in ("agent_steps", "episodes", "epsilon", "seed")] == [200, 3, 1, 4]
+
+
+def test_where_there_can_be_one_environment_episodes_come_one_after_another(drone, monkeypatch):
+    def alone(settings: TrainSettings, *, num_envs: int, seed: int) -> Environments:
+        if num_envs > 1:
+            raise NotParallel("There is one already.", "Close it.")
+        made.append(seed)
+        return make_environments(settings, num_envs=num_envs, seed=seed)
+
+    made, told = [], []
+    monkeypatch.setattr("trdlab.training.loading.make_environments", alone)
+    result, path = evaluate_run(drone, watch=told.append)
+    assert len(set(made)) == len(result.returns) == 5
+    assert (told[-1].finished, told[-1].episodes) == (5, 5)
+    assert json.loads(path.read_text())["returns"] == result.returns.tolist()
 
 
 @pytest.mark.parametrize("harm", ["a file", "a link", "nothing"])

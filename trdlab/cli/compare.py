@@ -47,6 +47,7 @@ def compare(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first episode.")] = 0,
     max_steps: common.MaxSteps = None,
     modules: common.Import = None,
+    details: common.Details = False,
     as_json: common.AsJson = False,
     out: Annotated[Path | None, common.pictures_option("without --json")] = None,
     verbose: common.Verbose = False,
@@ -58,7 +59,6 @@ def compare(
     from trdlab.agents.naming import find_pair
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.explanations.comparison import compare as two
-    from trdlab.show import comparison as show
 
     agents = find_pair(
         (first, second),
@@ -82,12 +82,9 @@ def compare(
             *agents, episodes=episodes, max_steps=max_steps, seed=seed, watch=progress.on_progress
         )
     if as_json:
-        from trdlab.show.comparison_data import comparison_to_dict
-
-        common.print_json(comparison_to_dict(found))
+        common.print_json(found.to_dict())
     else:
-        console, ascii_only = common.new_console()
-        console.print(show.page(found, ascii_only=ascii_only))
+        common.print_page(found, details=details)
     if out is not None:
         from trdlab.show.plots.comparison import comparison_figure
         from trdlab.show.plots.pictures import write_picture

@@ -68,6 +68,7 @@ def explain(
     ] = None,
     max_steps: common.MaxSteps = None,
     modules: common.Import = None,
+    details: common.Details = False,
     as_json: common.AsJson = False,
     out: Annotated[Path | None, common.pictures_option("without --what and --json")] = None,
     verbose: common.Verbose = False,
@@ -79,8 +80,8 @@ def explain(
     """
     from trdlab.agents.naming import find_agent
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explanations.explained import explain_agent, parse_parts
-    from trdlab.show import explained as show
+    from trdlab.explanations.explanation import explain as explain_agent
+    from trdlab.explanations.explanation import parse_parts
 
     parts = parse_parts(what)
     found = find_agent(
@@ -113,10 +114,9 @@ def explain(
             watch=progress.on_progress,
         )
     if as_json:
-        common.print_json(show.to_dict(explained))
+        common.print_json(explained.to_dict())
     else:
-        console, ascii_only = common.new_console()
-        console.print(show.page(explained, ascii_only=ascii_only))
+        common.print_page(explained, details=details)
     if out is not None:
         from trdlab.show.plots.explained import write_pictures
 

@@ -118,14 +118,15 @@ class TrainingProgress:
 
 
 class EpisodeProgress:
-    """Shows how far episodes are that are played, on a terminal only.
+    """Shows how far episodes are that are played.
 
     Args:
-        console: where to.
-        begin: what is shown before the first one is played.
+        console: where to; a line that changes if it is a terminal, otherwise one now and then.
+        begin: what a terminal shows before the first one is played.
     """
 
     def __init__(self, console: Console, begin: str = "Evaluating") -> None:
+        self._console, self._shown = console, time.monotonic()
         self._status = console.status(begin) if console.is_terminal else None
 
     def __enter__(self) -> "EpisodeProgress":
@@ -137,15 +138,14 @@ class EpisodeProgress:
         if self._status is not None:
             self._status.stop()
 
-    def on_episode(self, finished: int) -> None:
-        """Shows how many have finished."""
-        if self._status is not None:
-            self._status.update(f"Evaluating: {finished} episodes have finished")
-
     def on_progress(self, progress: "Playing") -> None:
-        """Shows how far episodes are that are played to explain an agent."""
+        """Shows how far episodes are, if it is time to."""
+        line = (
+            f"Playing {progress.what}: step {progress.steps:,}, {progress.finished} of "
+            f"{progress.episodes} are over"
+        )
         if self._status is not None:
-            self._status.update(
-                f"Playing {progress.what}: step {progress.steps:,}, {progress.finished} of "
-                f"{progress.episodes} are over"
-            )
+            self._status.update(line)
+        elif time.monotonic() - self._shown >= _LINE_SECONDS:
+            self._shown = time.monotonic()
+            self._console.print(line, soft_wrap=True, markup=False)

@@ -121,6 +121,15 @@ def evaluate(
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")] = 1000,
+    max_steps: Annotated[
+        int | None,
+        typer.Option(
+            "--max-steps",
+            min=1,
+            help="After which an episode is cut off, if not before.",
+            show_default="the environment's limit, or else 1000 or four horizons",
+        ),
+    ] = None,
     checkpoint: Checkpoint = None,
     modules: common.Import = None,
     as_json: common.AsJson = False,
@@ -142,7 +151,8 @@ def evaluate(
             epsilon=epsilon,
             seed=seed,
             step=checkpoint,
-            on_episode=progress.on_episode,
+            max_steps=max_steps,
+            watch=progress.on_progress,
         )
     if as_json:
         common.print_json(result.to_dict())

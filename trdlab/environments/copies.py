@@ -5,13 +5,9 @@ copies, or be pickled by its arguments, as Gymnasium's `EzPickle` does it: then 
 environment at its beginning.
 """
 
-import random
-from collections import deque
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
-from types import BuiltinMethodType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import gymnasium as gym
@@ -19,17 +15,19 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from trdlab.environments.answers import layers, observation_of, outcome_of
+from trdlab.environments.chance import Chance, generators, kept_luck, own_chance, renew
 
 Env = gym.Env[Any, Any]
-Chance = np.random.Generator | np.random.RandomState | random.Random
 
 LEAST, COMPARED = 8, 32
 """Steps into an episode before a copy differs from a new environment, and those compared then."""
 
-_COPIES, _EPISODES = 16, 8  # of one beginning, and from different seeds, to see what chance does
-_SEARCHED = 2_000  # objects in which generators of chance are looked for
+_COPIES, _EPISODES = 8, 8  # of one beginning, and from different seeds, to see what chance does
 _PLAIN = (bool, int, float, str, bytes, np.ndarray, np.generic)
-_CLOSED = (*_PLAIN, type, ModuleType, FunctionType, type(None))  # no generator is looked for there
+
+
+class NoDeepCopy(Exception):  # noqa: N818  it says what a copy is, not what failed
+    """A deep copy that is no copy; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -88,68 +86,31 @@ def prove(make: Callable[[], Env], past: Past, more: Sequence[int]) -> Proof:
         return middle
 
     fault = _fault(env, actions[played() :][:COMPARED])
-
-    def continued(seed: int) -> list[Any]:
-        begun(env, past.seed)
-        copy = make() if fault else deepcopy(env)
-        if fault:
-            begun(copy, past.seed)
-        renew_chance(copy, np.random.SeedSequence(seed), generators(env))
-        with kept_luck(seed):
-            went = trace(copy, more)
-        if fault:
-            copy.close()
-        return went
-
-    first = continued(0)
-    alike = all(continued(seed) == first for seed in range(1, _COPIES))
-    shared = alike and _vary(env, more)
+    new = make if fault else None
+    shared = _same_every_time(env, past.seed, more, new) and _vary(env, more)
     env.close()
     return Proof(fault, shared)
 
 
-def unlike(env: Env, copy: Env) -> str:
-    """Returns why a copy is none that has another plain value in an attribute; else nothing."""
-    for one, other in zip(layers(env), layers(copy), strict=False):
-        theirs = vars(other)
-        for name, value in vars(one).items():
-            if isinstance(value, _PLAIN) and not _same(value, theirs.get(name)):
-                return f"Deep copies have another '{name}'."
-    return ""
+def copied(env: Env, held: Sequence[Chance]) -> tuple[Env, list[Chance]]:
+    """Returns a deep copy, and the generators of chance that it has for its own.
 
+    Args:
+        env: what to copy.
+        held: the generators of the environment.
 
-def generators(env: Any) -> list[Chance]:
-    """Returns the generators of chance that an environment holds, wherever it holds them.
-
-    They are looked for in attributes, lists, tuples and dictionaries, the nearest first, and behind
-    methods such as `rng.random`; those of modules, closures and libraries in C are not found.
+    Raises:
+        NoDeepCopy: none can be made, or it is seen to be none.
     """
-    found: list[Chance] = []
-    queue, seen = deque([env]), {id(env)}
-    while queue and len(seen) < _SEARCHED:
-        thing = queue.popleft()
-        if isinstance(thing, Chance):
-            found.append(thing)
-            continue
-        for part in _parts(thing):
-            if id(part) not in seen and not isinstance(part, _CLOSED):
-                seen.add(id(part))
-                queue.append(part)
-    return found
-
-
-def renew_chance(env: Env, words: np.random.SeedSequence, shared: Iterable[Chance]) -> None:
-    """Seeds the generators of an environment anew, all but those shared with another one."""
-    keep: Container[int] = {id(generator) for generator in shared}
-    own = [generator for generator in generators(env) if id(generator) not in keep]
-    for generator, seed in zip(own, words.spawn(len(own)), strict=True):
-        if isinstance(generator, np.random.Generator):
-            bits = generator.bit_generator
-            bits.state = type(bits)(seed).state
-        elif isinstance(generator, np.random.RandomState):
-            generator.set_state(np.random.RandomState(seed.generate_state(4)).get_state())
-        else:
-            generator.seed(seed.generate_state(1).item())
+    memo: dict[int, Any] = {}  # what has been copied, by the id of the original
+    try:
+        copy = deepcopy(env, memo)
+    except Exception as error:  # anything can be raised in another's code
+        raise NoDeepCopy(f"No deep copies can be made ({_say(error)}).") from error
+    if fault := _unlike(env, copy):
+        raise NoDeepCopy(fault)
+    twins = [memo[id(generator)] for generator in held if id(generator) in memo]
+    return copy, twins if len(twins) == len(held) else own_chance(copy, held)
 
 
 def begun(env: Env, seed: int) -> bytes:
@@ -176,39 +137,56 @@ def goes_on(env: Env, past: Past) -> bool:
     return not (went and any(went[-1][2:]))
 
 
-@contextmanager
-def kept_luck(seed: int | None = None) -> Iterator[None]:
-    """Leaves the chance that all programs share, of NumPy and Python, as it was before.
-
-    Args:
-        seed: where it begins within; by default where it is.
-    """
-    numpy_state, python_state = np.random.get_state(), random.getstate()  # noqa: NPY002
-    if seed is not None:
-        np.random.seed(seed)  # noqa: NPY002
-        random.seed(seed)
-    try:
-        yield
-    finally:
-        np.random.set_state(numpy_state)  # noqa: NPY002
-        random.setstate(python_state)
-
-
 def _fault(env: Env, rest: Sequence[int]) -> str:
     """Returns why a deep copy of an environment is none; both are stepped."""
     try:
-        copy = deepcopy(env)
-    except Exception as error:  # noqa: BLE001  anything can be raised in another's code
-        return f"No deep copies can be made ({type(error).__name__}: {error})."
-    if fault := unlike(env, copy):
-        return fault
-    try:
+        copy, _ = copied(env, generators(env))
         with kept_luck(1):
-            copied = trace(copy, rest)
-    except Exception as error:  # noqa: BLE001
-        return f"Deep copies cannot be stepped ({type(error).__name__}: {error})."
+            went = trace(copy, rest)
+    except NoDeepCopy as error:
+        return str(error)
+    except Exception as error:  # noqa: BLE001  anything can be raised in another's code
+        return f"Deep copies cannot be stepped ({_say(error)})."
     with kept_luck(1):
-        return "" if copied == trace(env, rest) else "Deep copies go another way."
+        return "" if went == trace(env, rest) else "Deep copies go another way."
+
+
+def _unlike(env: Env, copy: Env) -> str:
+    """Returns why a copy is none, where it has another plain value in an attribute; or nothing."""
+    for one, other in zip(layers(env), layers(copy), strict=False):
+        theirs = vars(other)
+        for name, value in vars(one).items():
+            if isinstance(value, _PLAIN) and not _same(value, theirs.get(name)):
+                return f"Deep copies have another '{name}'."
+    return ""
+
+
+def _same_every_time(
+    env: Env, seed: int, actions: Sequence[int], new: Callable[[], Env] | None
+) -> bool:
+    """Returns whether copies with fresh chance do the same from the beginning of an episode on.
+
+    Args:
+        env: what they are copies of.
+        seed: that the episode begins with.
+        actions: taken in each.
+        new: makes environments in place of deep copies.
+    """
+    begun(env, seed)
+
+    def went(number: int) -> list[Any]:
+        copy = deepcopy(env) if new is None else new()
+        if new is not None:
+            begun(copy, seed)
+        renew(own_chance(copy, generators(env)), np.random.SeedSequence(number))
+        with kept_luck(number):
+            told = trace(copy, actions)
+        if new is not None:
+            copy.close()
+        return told
+
+    first = went(0)
+    return all(went(number) == first for number in range(1, _COPIES))
 
 
 def _vary(env: Env, actions: Sequence[int]) -> bool:
@@ -229,16 +207,6 @@ def _vary(env: Env, actions: Sequence[int]) -> bool:
     return False
 
 
-def _parts(thing: Any) -> Iterable[Any]:
-    if isinstance(thing, dict):
-        return thing.values()
-    if isinstance(thing, list | tuple | deque):
-        return thing
-    if isinstance(thing, MethodType | BuiltinMethodType):
-        return (thing.__self__,)
-    return getattr(thing, "__dict__", {}).values()
-
-
 def _same(one: Any, other: Any) -> bool:
     """Returns whether a plain value is the same as another, NaN as NaN; if that can be told."""
     if type(one) is not type(other) or getattr(one, "dtype", None) == np.dtype(object):
@@ -254,3 +222,8 @@ def _told(value: Any) -> bytes:
 
 def _kind(env: Env) -> str:
     return type(getattr(env, "unwrapped", env)).__name__
+
+
+def _say(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -1,7 +1,7 @@
 """Gymnasium environments, stepped one after the other."""
 
 from collections.abc import Mapping
-from copy import copy, deepcopy
+from copy import copy
 from dataclasses import replace
 from typing import Any, Self
 
@@ -10,17 +10,16 @@ import numpy as np
 from trdlab.arrays import BoolArray, IntArray
 from trdlab.environments.answers import observation_of, outcome_of
 from trdlab.environments.aside import aside
+from trdlab.environments.chance import generators, kept_luck, own_chance, renew
 from trdlab.environments.copies import (
     COMPARED,
     LEAST,
     Env,
+    NoDeepCopy,
     Past,
     Proof,
-    generators,
-    kept_luck,
+    copied,
     prove,
-    renew_chance,
-    unlike,
 )
 from trdlab.environments.history import Histories, checked_actions
 from trdlab.environments.naming import action_names
@@ -137,30 +136,34 @@ class GymEnvironments:
     def branch(self, which: IntArray, seed: int) -> Self:
         """Returns copies of the environments `which [B′]`, each with a chance of its own.
 
-        They are deep copies, where these have proved to be copies (see `prove`); otherwise seed and
-        actions are played again in new environments, which must show the same. In either case their
-        generators of chance are seeded anew (see `generators`). Their `state_dict` cannot be asked
-        for.
+        They are deep copies where these have proved to be copies: another environment of this kind
+        is stepped as its copy was, and does the same. Elsewhere seed and actions are played again
+        in new environments, which must show the same. Then every generator of chance that a copy
+        holds is seeded anew: `np_random`, and those of NumPy and Python in attributes and in what
+        these hold. Where others decide, out of reach, `shared_chance` says so as far as that was
+        seen. The `state_dict` of copies cannot be asked for; close them where they hold something.
 
         Raises:
             NotCopyable: neither gives a copy.
             TrdlabError: no episode has begun.
         """
-        chosen = which.tolist()
+        chosen, found = which.tolist(), []
         with kept_luck():  # copying must not disturb the chance of what is copied
-            proof = self._proof or self._proved(chosen[0])
-            envs = [] if proof.fault else [deepcopy(self._envs[env]) for env in chosen]
-            for env, twin in zip(chosen, envs, strict=False):
-                if fault := unlike(self._envs[env], twin):
-                    proof, envs = replace(proof, fault=fault), []
-                    break
-            self._proof = proof
-            copies = self._with(envs or self._played_again(chosen, proof.fault), seed)
-            seeds = np.random.SeedSequence(seed).spawn(len(chosen))
+            self._proof = self._proof or self._proved(chosen[0])
             held = {env: generators(self._envs[env]) for env in set(chosen)}
-            for env, twin, words in zip(chosen, copies._envs, seeds, strict=True):
-                renew_chance(twin, words, held[env])
-        copies.shared_chance = proof.shared_chance
+            if not self._proof.fault:
+                try:
+                    found = [copied(self._envs[env], held[env]) for env in chosen]
+                except NoDeepCopy as error:
+                    self._proof = replace(self._proof, fault=str(error))
+            if self._proof.fault:
+                again = zip(chosen, self._played_again(chosen, self._proof.fault), strict=True)
+                found = [(twin, own_chance(twin, held[env])) for env, twin in again]
+            words = np.random.SeedSequence(seed).spawn(len(chosen))
+            for (_, chance), own in zip(found, words, strict=True):
+                renew(chance, own)
+        copies = self._with([twin for twin, _ in found], seed)
+        copies.shared_chance = self._proof.shared_chance
         return copies
 
     @aside()
@@ -188,7 +191,7 @@ class GymEnvironments:
         """Returns what others of this kind show about copies of an environment."""
         seed, past = self._histories.past(env)
         more = np.random.default_rng(0).integers(self.num_actions, size=LEAST + COMPARED)
-        actions = (self.first_action + np.concatenate([past, more])).tolist()
+        actions = list(self.first_action + np.concatenate([past, more]))
         try:
             return prove(
                 lambda: self._source.make(1, beside=self._envs)[0],

@@ -12,6 +12,7 @@ import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
 from trdlab.environments.arguments import say_arguments
+from trdlab.environments.aside import aside
 from trdlab.errors import InputError, NotImported, TrdlabError, closest
 
 # By its name, as Gymnasium finds entry points: what registers our maps stands above this layer.
@@ -20,13 +21,14 @@ _EXTRAS = {"box2d": "trdlab[box2d]"}
 _LISTED = 'python -c "import gymnasium; gymnasium.pprint_registry()" lists those that there are.'
 
 
+@aside()
 def make_environment(
     env_id: str,
     arguments: Mapping[str, Any] | None = None,
     *,
     known: Iterable[str] | None = None,
 ) -> gym.Env[Any, Any]:
-    """Makes an environment by its Gymnasium id.
+    """Makes an environment by its Gymnasium id; what it prints goes to stderr.
 
     Args:
         env_id: such as `CartPole-v1`, or `module:id` to import a module first; trdlab's own maps,

@@ -10,7 +10,8 @@ from gymnasium.envs.registration import EnvSpec
 
 from trdlab.environments.answers import check_reset
 from trdlab.environments.aside import aside
-from trdlab.environments.copies import Env, begun, kept_luck, trace
+from trdlab.environments.chance import kept_luck
+from trdlab.environments.copies import Env, begun, trace
 from trdlab.environments.making import make_environment
 from trdlab.environments.protocol import NotParallel
 from trdlab.environments.spaces import discrete_actions
@@ -82,7 +83,7 @@ class Source:
                 raise
             raise NotParallel(
                 f"There can be {len(beside) + len(envs)} of {self.name} at a time: {error.cause}",
-                "Play its episodes one after another.",
+                "Ask for no more.",
             ) from error
         return envs
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from trdlab.explanations.calibration.trust import Trust
     from trdlab.explanations.claims import Finding
     from trdlab.explanations.comparison.compare import compare
-    from trdlab.explanations.comparison.report import Comparison
+    from trdlab.explanations.comparison.comparison import Comparison
     from trdlab.explanations.episode.played import Played, play
     from trdlab.explanations.episode.revision import Revision, revise
     from trdlab.explanations.episode.story import Story, tell

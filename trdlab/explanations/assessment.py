@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trdlab.agents.agent import Agent
+from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition
 from trdlab.environments import NotCopyable, NotParallel
 from trdlab.errors import InputError
+from trdlab.explanations.calibration.calibration import Calibration
 from trdlab.explanations.calibration.report import TrustReport, judge
 from trdlab.explanations.moment.exact import exact_moment
 from trdlab.explanations.moment.moment import Moment
@@ -220,9 +222,34 @@ def moment_of_play(agent: Agent, playing: Playing) -> Moment:
     )
 
 
+def judged(moment: Moment, report: TrustReport) -> Moment:
+    """Returns a moment with what a report knows of such forecasts.
+
+    That is how far they can be trusted, what they are off by, and whether rewards are of one kind.
+
+    Args:
+        moment: what is expected.
+        report: on the estimator that expects it.
+    """
+    reliability = report.calibration.reliability
+    return replace(
+        moment,
+        trust=report.trust,
+        foil_trust=report.foil_trust,
+        error=_root_mean_square(report.calibration),
+        foil_error=None if report.foils is None else _root_mean_square(report.foils),
+        only_reward=None if reliability is None else reliability.amount,
+    )
+
+
+def _root_mean_square(calibration: Calibration) -> FloatArray:
+    error = calibration.error
+    return np.where(np.isfinite(error.low), np.sqrt(error.value), np.nan)
+
+
 def try_out(
     agent: Agent, action: str, foil: str, *, seed: int = 0, step: int = 0, copies: int | None = None
-) -> Trial | None:
+) -> Trial:
     """Tries two actions at a step of an agent's episode, each from copies of the state.
 
     Args:
@@ -233,11 +260,9 @@ def try_out(
         step: of that episode.
         copies: how often each is tried, by default as the agent's `copying` says.
 
-    Returns:
-        What was forecast and what came; None where states cannot be copied.
-
     Raises:
         InputError: there is no such step or action, or both are the same.
+        NotCopyable: the states of its environment cannot be copied.
     """
     with agent.begin(seed=seed) as recording:
         recording.play_to(step)
@@ -246,7 +271,7 @@ def try_out(
 
 def try_out_in_play(
     agent: Agent, playing: Playing, action: str, foil: str, *, seed: int, copies: int | None = None
-) -> Trial | None:
+) -> Trial:
     """Tries two actions where the first of an agent's episodes stands, as `try_out` does.
 
     The copies are followed until all have ended, but no further than `FOLLOWED` steps or the
@@ -256,10 +281,7 @@ def try_out_in_play(
     tries = agent.copying.tries if copies is None else copies
     branching = Branching(agent.estimator, agent.policy, tries, steps)
     numbers = (agent.action_names.index(name) for name in (action, foil))
-    try:
-        found = counterfactual(branching, playing, *numbers, seed=seed)
-    except NotCopyable:
-        return None
+    found = counterfactual(branching, playing, *numbers, seed=seed)
     return Trial(found, agent.action_names, agent.seconds_per_step)
 
 

@@ -220,4 +220,4 @@ def plain_data(value: Any) -> Any:
 def _skeleton(says: str) -> re.Pattern[str]:
     """Returns the pattern of a rule's sentences: any text in its slots."""
     pieces = [re.escape(text) for text in re.split(r"\{[^}]*\}", says)]
-    return re.compile("(.+)".join(pieces), re.IGNORECASE)  # a slot may begin the sentence
+    return re.compile("(.*)".join(pieces), re.IGNORECASE)  # a slot may begin the sentence

@@ -16,10 +16,11 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     """Returns the forms that a slot `{field:form}` of any sentence can take.
 
     Numbers: `number` (2.71), `gives` and `pays` (gives 2.71, gives nothing, costs 0.5), `estimate`,
-    `percent`, `given` (what the user gave: all its digits), `roots`, `count`, `steps`, `episodes`,
-    `times`, `states`. Whether a mean is meant: `average` (of `True`: it is sure; nothing is said).
+    `percent`, `given` (by the user: all its digits), `roots`, `tenths`, `count`, `steps`,
+    `episodes`, `times`, `states`. What is said where a flag asks for it: `average` and `averages`
+    (unless it is sure), `worth`, `net`, `ties`.
     Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `within`
-    (up to a step: at once, within 4 steps), `next` (the next 4 steps), `step` (of an episode).
+    (up to a step: in the first step, within 4 steps), `next` (the next 4 steps), `step`.
     Names: `action`, `names`, `text`.
 
     Args:
@@ -32,7 +33,7 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
 
     def within(last_step: int) -> str:
         if last_step == 0:
-            return "at once"
+            return "in the first step"
         return f"within {counted(last_step + 1, 'step')}" + _played(last_step + 1, seconds)
 
     return {
@@ -43,6 +44,9 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "gives": Form(lambda x, digits: _does(x, digits, "gives"), abs),
         "pays": Form(lambda x, digits: _does(x, digits, "pays"), abs),
         "average": _of(lambda is_sure: "" if is_sure else " on average"),
+        "averages": _of(lambda are_sure: "" if are_sure else ", on average"),
+        "worth": _of(lambda is_discounted: "worth " if is_discounted else ""),
+        "tenths": _of(lambda x: f"{x:.1f}"),
         "estimate": Form(_estimate, lambda estimate: float(estimate.value)),
         "percent": _of(lambda share: f"{percent(share)} %"),
         "given": _of(plain),
@@ -51,9 +55,11 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "steps": _of(lambda count: counted(count, "step")),
         "episodes": _of(lambda count: counted(count, "episode")),
         "states": _of(lambda count: counted(count, "state")),
+        "ties": _of(lambda is_tied: ", with ties broken as here" if is_tied else ""),
+        "net": _of(lambda is_net: ", costs and rewards together," if is_net else ""),
         "times": _of(lambda count: "once" if count == 1 else f"{count:,} times"),
         "when": _of(when),
-        "whens": _of(lambda components: joined([when(i) for i in components])),
+        "whens": _of(lambda components: joined(whens_of(axis, components))),
         "within": _of(within),
         "next": _of(lambda count: "the next step" if count == 1 else f"the next {count:,} steps"),
         "step": _of(lambda step: f"step {step:,}"),
@@ -77,6 +83,30 @@ def when_of(axis: TimeAxis, component: int) -> str:
     if start == 0:
         return f"within {axis.width:,} steps"
     return f"in {start:,} to {steps[-1]:,} steps"
+
+
+def whens_of(axis: TimeAxis, components: Sequence[int]) -> list[str]:
+    """Returns when some components come, those that follow each other told as one.
+
+    >>> whens_of(TimeAxis(0.9, 9), [0, 2, 3, 4, 6]), whens_of(TimeAxis(0.9, 2, 2), [0, 1])
+    (['now', 'in 2 to 4 steps', 'in 6 steps'], ['within 4 steps'])
+    """
+    runs: list[list[int]] = []
+    for i in components:
+        if runs and runs[-1][-1] == i - 1:
+            runs[-1].append(i)
+        else:
+            runs.append([i])
+    return [_run_of(axis, run[0], run[-1]) for run in runs]
+
+
+def _run_of(axis: TimeAxis, first: int, last: int) -> str:
+    begins, steps = axis.start(first), axis.steps(last)
+    if first == last or steps is None:
+        return when_of(axis, first) if first == last else f"in {counted(begins, 'step')} or later"
+    if begins == 0:
+        return f"within {steps[-1] + 1:,} steps"
+    return f"in {begins:,} to {steps[-1]:,} steps"
 
 
 def counted(count: int, noun: str) -> str:

@@ -30,7 +30,7 @@ def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
 
 def evaluation_page(evaluation: Evaluation, *, ascii_only: bool = False) -> RenderableType:
     """Returns what an agent reached: means with intervals, and how the episodes ended."""
-    count, cut = len(evaluation.returns), int(evaluation.truncated.sum())
+    count = len(evaluation.returns)
     table = Table(box=None, padding=(0, 3, 0, 0), show_header=False, pad_edge=False)
     low, high = float(evaluation.returns.min()), float(evaluation.returns.max())
     decimals = _decimals(low, high)
@@ -43,10 +43,19 @@ def evaluation_page(evaluation: Evaluation, *, ascii_only: bool = False) -> Rend
     span = _span(low, high, decimals)
     table.add_row("least and most", fit(span, ascii_only=ascii_only), "")
     length = f"{evaluation.lengths.mean():,.1f} agent steps"
-    table.add_row("mean length", length, f"{cut} of {count} were cut off" if cut else "")
+    table.add_row("mean length", length, _cut_off(evaluation))
     random = f", {evaluation.epsilon:.1%} random actions" if evaluation.epsilon else ""
     head = f"{count} episodes, greedy{random}, seed {evaluation.seed}; raw rewards, undiscounted"
     return Group(Text(fit(head, ascii_only=ascii_only)), table)
+
+
+def _cut_off(evaluation: Evaluation) -> str:
+    """Returns how many episodes were cut off, and after how many steps where all were alike."""
+    cut, limit = int(evaluation.truncated.sum()), evaluation.max_steps
+    told = f"{cut} of {len(evaluation.lengths)} were cut off"
+    if not cut or limit is None or (evaluation.lengths[evaluation.truncated] != limit).any():
+        return told if cut else ""
+    return f"{told} at step {limit:,}"
 
 
 def runs_table(runs: Sequence[RunSummary], *, ascii_only: bool = False) -> RenderableType:

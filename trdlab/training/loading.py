@@ -1,16 +1,20 @@
 """The agent of a run: loaded as an Estimator, and evaluated."""
 
-from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
+from trdlab.environments import Environments, in_batches
 from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
 from trdlab.errors import OutputError, TrdlabError
 from trdlab.files import check_own, write_json
-from trdlab.rollouts.evaluation import Evaluation, evaluate
+from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
+from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
 from trdlab.runs import RunFolder, read_arrays
 from trdlab.training.setup import (
     future,
@@ -88,7 +92,8 @@ def evaluate_run(
     epsilon: float | None = None,
     seed: int = EVALUATION_SEED,
     step: int | None = None,
-    on_episode: Callable[[int], None] = lambda finished: None,
+    max_steps: int | None = None,
+    watch: Watch = unwatched,
 ) -> tuple[Evaluation, Path | OutputError]:
     """Evaluates the agent of a run, and keeps the result in its folder if that can be written.
 
@@ -98,7 +103,9 @@ def evaluate_run(
         epsilon: the chance of a random action; likewise.
         seed: of the environments and the random actions.
         step: of an older checkpoint, in agent steps; by default the newest.
-        on_episode: told the number of finished episodes whenever some finish.
+        max_steps: after which an episode is cut off, if not before; by default the environment's
+            own limit, or where it has none what `usual_limit` says.
+        watch: told how far the episodes are.
 
     Returns:
         The evaluation, and the file that holds it, or why it could not be kept.
@@ -116,14 +123,37 @@ def evaluate_run(
     step, estimator = _loaded(folder, step)
     count = episodes or settings.evaluate_episodes or 30
     chance = settings.evaluate_epsilon if epsilon is None else epsilon
-    environments = make_environments(settings, num_envs=count, seed=seed)
-    try:
+    parts: list[Evaluation] = []
+
+    def make(num_envs: int, seed: int) -> Environments:
+        return make_environments(settings, num_envs=num_envs, seed=seed)
+
+    for environments in in_batches(make, count, seed):
         interface_of(folder).check_fits(Interface.of(environments), settings.env)
-        result = evaluate(estimator, environments, epsilon=chance, seed=seed, on_episode=on_episode)
-    finally:
-        environments.close()
-    name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}.json"
+        parts.append(
+            evaluate(
+                estimator,
+                environments,
+                epsilon=chance,
+                seed=seed + len(parts),  # a single batch, where there can be one
+                max_steps=_limit(environments, max_steps, settings.time_axis),
+                watch=partial(_watch_all, watch, sum(len(of.returns) for of in parts), count),
+            )
+        )
+    result = joined(parts)
+    limit = f"-max-steps-{max_steps}" if max_steps else ""
+    name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}{limit}.json"
     return result, _keep(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
+
+
+def _watch_all(watch: Watch, before: int, count: int, now: Progress) -> None:
+    """Tells how far episodes are of which some have been played before these."""
+    watch(replace(now, finished=before + now.finished, episodes=count))
+
+
+def _limit(environments: Environments, given: int | None, axis: TimeAxis) -> int | None:
+    """Returns the steps after which to cut an episode off; None where the environment does."""
+    return given if given or environments.time_limit else usual_limit(axis)
 
 
 def _keep(path: Path, data: dict[str, Any]) -> Path | OutputError:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from trdlab.explanations.comparison.findings import comparison_findings
 
 from trdlab.agents import Agent, find_pair, gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
@@ -13,8 +14,7 @@ from trdlab.estimator import Future
 from trdlab.explanations import moment_at
 from trdlab.explanations.comparison import background, differences
 from trdlab.explanations.comparison.compare import compare
-from trdlab.explanations.comparison.findings import comparison_findings
-from trdlab.explanations.comparison.report import Comparison, centre, compared
+from trdlab.explanations.comparison.comparison import Comparison, centre, compared
 from trdlab.explanations.comparison.states import Visits, visit
 from trdlab.policies import Memoryless
 from trdlab.rollouts.playing import Progress

@@ -10,6 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
+from trdlab.explanations.comparison.differences import ComparisonFinding
+from trdlab.explanations.comparison.findings import comparison_findings
+from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page
+from trdlab.show.comparison_data import comparison_to_dict
 
 import mutants
 from trdlab.agents import Agent, find_pair, gridworld_agent
@@ -20,14 +24,10 @@ from trdlab.explanations import assess
 from trdlab.explanations.calibration.report import TrustReport
 from trdlab.explanations.calibration.trust import trust
 from trdlab.explanations.comparison.compare import compare
-from trdlab.explanations.comparison.differences import ComparisonFinding
-from trdlab.explanations.comparison.findings import comparison_findings
-from trdlab.explanations.comparison.report import Comparison, compared
+from trdlab.explanations.comparison.comparison import Comparison, compared
 from trdlab.explanations.comparison.states import Visits
 from trdlab.intervals import Estimates
 from trdlab.policies import Memoryless
-from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page
-from trdlab.show.comparison_data import comparison_to_dict
 from trdlab.show.plots.comparison import comparison_figure
 from trdlab.tabular import ExactTable
 

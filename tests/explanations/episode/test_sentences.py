@@ -8,6 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from trdlab.show.story import (
+    TEMPLATES,
+    check_story,
+    story_sentence,
+    story_sentences,
+    story_to_dict,
+)
 
 import mutants
 from trdlab.decomposition import RewardDecomposition, TimeAxis
@@ -19,13 +26,6 @@ from trdlab.explanations.episode.surprises import sizes, surprise
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import what_followed
-from trdlab.show.story import (
-    TEMPLATES,
-    check_story,
-    story_sentence,
-    story_sentences,
-    story_to_dict,
-)
 from trdlab.tabular import exact
 from trdlab.tabular.episodes import ModelEnvironments
 

@@ -6,7 +6,7 @@ from trdlab.agents.agent import Agent
 from trdlab.errors import InputError
 from trdlab.explanations.assessment import assess, usual_episodes
 from trdlab.explanations.calibration.report import TrustReport
-from trdlab.explanations.comparison.report import SIDES, Comparison, compared
+from trdlab.explanations.comparison.comparison import SIDES, Comparison, compared
 from trdlab.explanations.comparison.states import visit
 from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
 

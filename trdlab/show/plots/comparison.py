@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from trdlab.decomposition import TimeAxis
-from trdlab.explanations.comparison.report import Comparison
+from trdlab.explanations.comparison.comparison import Comparison
 from trdlab.intervals import Estimates
 from trdlab.show.comparison import titles
 from trdlab.show.plots.pictures import check_pictures

@@ -10,6 +10,8 @@ from trdlab.decomposition import TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations.calibration.report import TrustReport
 from trdlab.explanations.comparison.states import Visits
+from trdlab.explanations.rules import Language
+from trdlab.explanations.words import forms_of
 from trdlab.intervals import (
     FEWEST_EPISODES,
     LEVEL,
@@ -19,14 +21,15 @@ from trdlab.intervals import (
     percentiles,
     pooled,
 )
+from trdlab.printable import Printable
 from trdlab.statistics import Estimate
 
 SIDES = ("A", "B")
 """What the two are called."""
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Printable):
     """How far two agents are apart, on average over the states that both came to.
 
     Intervals are bootstrapped by the seeds of the episodes: the two episodes of a seed, that of the
@@ -74,6 +77,12 @@ class Comparison:
     def time_axis(self) -> TimeAxis:
         """What the components mean."""
         return self.visits.time_axis
+
+
+COMPARISONS = Language[Comparison](
+    "this comparison", lambda of: forms_of(of.time_axis, of.seconds_per_step)
+)
+"""What there is to say of a comparison; the two agents are A and B."""
 
 
 def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:

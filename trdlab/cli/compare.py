@@ -57,7 +57,7 @@ def compare(
     Both play episodes, and both are asked about the states of them all.
     """
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explanations.comparison import compare as two
+    from trdlab.explanations.comparison import comparing as two
 
     agents = two.find_pair(
         (first, second),

@@ -12,7 +12,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations import moment_at
 from trdlab.explanations.comparison import background, differences
-from trdlab.explanations.comparison.compare import compare, find_pair
+from trdlab.explanations.comparison.comparing import compare, find_pair
 from trdlab.explanations.comparison.findings import comparison_findings
 from trdlab.explanations.comparison.comparison import Comparison, centre, compared
 from trdlab.explanations.comparison.states import Visits, visit

@@ -19,7 +19,7 @@ from trdlab.estimator import Future
 from trdlab.explanations import assess
 from trdlab.explanations.calibration.report import TrustReport
 from trdlab.explanations.calibration.trust import trust
-from trdlab.explanations.comparison.compare import compare, find_pair
+from trdlab.explanations.comparison.comparing import compare, find_pair
 from trdlab.explanations.comparison.differences import ComparisonFinding
 from trdlab.explanations.comparison.findings import comparison_findings
 from trdlab.explanations.comparison.comparison import Comparison, compared

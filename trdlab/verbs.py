@@ -295,7 +295,7 @@ def compare(
         InputError: one is no agent, or the two cannot be compared.
     """
     from trdlab.agents.naming import find_pair
-    from trdlab.explanations.comparison import compare as comparing
+    from trdlab.explanations.comparison import comparing
     from trdlab.rollouts.playing import unwatched
 
     names = (first, second)

@@ -58,7 +58,7 @@ def compare(
     """
     from trdlab.agents.naming import find_pair
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explanations.comparison import compare as two
+    from trdlab.explanations.comparison import comparing as two
 
     agents = find_pair(
         (first, second),

@@ -23,7 +23,7 @@ from trdlab.estimator import Future
 from trdlab.explanations import assess
 from trdlab.explanations.calibration.report import TrustReport
 from trdlab.explanations.calibration.trust import trust
-from trdlab.explanations.comparison.compare import compare
+from trdlab.explanations.comparison.comparing import compare
 from trdlab.explanations.comparison.comparison import Comparison, compared
 from trdlab.explanations.comparison.states import Visits
 from trdlab.intervals import Estimates

@@ -41,7 +41,7 @@ class Falling:
         Gridworld(load_map("drone")),
         Gridworld(load_map("drone")).mdp,
         GridworldEnv("drone"),
-        gym.make("trdlab/DroneGridworld-v0"),
+        gym.make("trdlab.envs:trdlab/DroneGridworld-v0"),
         "trdlab/DroneGridworld-v0",
     ],
 )
@@ -122,12 +122,12 @@ def test_what_is_no_agent_says_what_is_missing(what, given, message):
 
 def test_a_notebooks_first_cell_explains_the_drone():
     explained = trdlab.explain("gridworld:drone", episodes=20)
-    assert explained.explanation.action == "down"
+    assert explained.choice.action == "down"
     assert explained.report.num_episodes == 20
     one = trdlab.explain(
         "gridworld:drone", step=1, action=3, parts="forecast", episodes=0, horizon=8
     )
-    assert (one.explanation.action, one.report, one.time_axis.horizon) == ("right", None, 8)
+    assert (one.choice.action, one.report, one.time_axis.horizon) == ("right", None, 8)
 
 
 def test_calibration_and_comparison_are_one_call_each():
@@ -221,4 +221,4 @@ def test_the_model_of_a_table_alone_is_acted_in():
     agent = trdlab.agent(coin, gamma=0.5, horizon=1)
     assert agent.action_names == ("action 0", "action 1")
     assert isinstance(agent.make(2, 0), ModelEnvironments)
-    assert trdlab.explain(agent, episodes=12).explanation.action == "action 0"
+    assert trdlab.explain(agent, episodes=12).choice.action == "action 0"

@@ -8,7 +8,7 @@ import pytest
 from trdlab.agents import Agent, gridworld_agent
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explanations import assess, play
+from trdlab.explanations import assess
 from trdlab.policies import Memoryless
 from trdlab.rollouts import collect
 from trdlab.rollouts.playing import Progress, usual_limit
@@ -44,7 +44,7 @@ def test_a_limit_of_ours_is_like_one_of_the_environment():
 
 def test_an_episode_of_no_step_is_refused():
     with pytest.raises(InputError, match="Episodes have 0 steps"):
-        play(undecided(), max_steps=0)
+        undecided().play(1, seed=0, max_steps=0)
 
 
 def test_episodes_last_four_horizons_at_least():

@@ -441,7 +441,9 @@ def test_an_environment_that_gained_an_action_is_refused_by_all(tmp_path, trdlab
     run = train(tmp_path / "run", "Growing-v0")
     gym.registry["Growing-v0"].entry_point = Grown
     for command in ("resume", "evaluate", "explain"):
-        message = "'Growing-v0' does not fit the agent: its actions are 3, those of the agent 2."
+        message = (
+            "'Growing-v0' does not fit the agent: it has 3 actions, and the agent knows 2 actions."
+        )
         refused(trdlab(command, run), 2, message)
     del gym.registry["Growing-v0"]
 

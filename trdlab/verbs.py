@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trdlab.arrays import FloatArray
 from trdlab.errors import InputError, closest
 
 if TYPE_CHECKING:
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from trdlab.explanations.calibration.report import TrustReport
     from trdlab.explanations.comparison.comparison import Comparison
     from trdlab.explanations.explanation import Explanation
-    from trdlab.policies import Policy
+    from trdlab.policies import Who
     from trdlab.rollouts.playing import Watch
 
 
@@ -28,7 +27,7 @@ def agent(
     gamma: float | None = None,
     horizon: int | None = None,
     width: int | None = None,
-    policy: "Policy | Callable[[Any], FloatArray] | None" = None,
+    policy: "Who | None" = None,
     name: str | None = None,
     action_names: Sequence[str] | None = None,
 ) -> "Agent":

@@ -1,6 +1,16 @@
 """Policies: who acts, with memory where there is some."""
 
 from trdlab.policies.protocol import Policy, ask, rows
-from trdlab.policies.ready import EpsilonGreedy, Greedy, Memoryless, acting, greedy
+from trdlab.policies.ready import EpsilonGreedy, Greedy, Memoryless, Who, acting, greedy
 
-__all__ = ["EpsilonGreedy", "Greedy", "Memoryless", "Policy", "acting", "ask", "greedy", "rows"]
+__all__ = [
+    "EpsilonGreedy",
+    "Greedy",
+    "Memoryless",
+    "Policy",
+    "Who",
+    "acting",
+    "ask",
+    "greedy",
+    "rows",
+]

@@ -11,6 +11,9 @@ from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.policies.protocol import Policy
 
+Who = Policy | Estimator | Callable[[Any], FloatArray]
+"""Who can act: by itself, greedily, or by a function to action probabilities."""
+
 
 def greedy(value: FloatArray) -> FloatArray:
     """Returns probabilities `[B, A]`: 1 for the action of largest value, of equals for the first.
@@ -81,7 +84,7 @@ class EpsilonGreedy:
         return (1.0 - self.epsilon) * probabilities + evenly, state
 
 
-def acting(who: Policy | Estimator | Callable[[Any], FloatArray]) -> Policy:
+def acting(who: Who) -> Policy:
     """Returns who acts: a policy as it is, an estimator by its greedy policy, or by a function.
 
     Raises:

@@ -11,8 +11,9 @@ from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
+from trdlab.policies import Who
 from trdlab.tabular import MDP
-from trdlab.testing.asking import Asking, ContractError, Policy, difference
+from trdlab.testing.asking import Asking, ContractError, difference
 from trdlab.testing.audits import ExactAudit, audit_exact, audit_law, matching_model
 from trdlab.testing.report import EstimatorReport
 from trdlab.testing.rollout import discrete_actions, play
@@ -29,7 +30,7 @@ def check_estimator(
     estimator: Estimator,
     env: gym.Env[Any, Any],
     *,
-    policy: Policy | None = None,
+    policy: Who | None = None,
     reference: RewardDecomposition | None = None,
     tolerance: float | None = None,
     precision: float = 1e-4,

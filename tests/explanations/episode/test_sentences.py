@@ -8,13 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from trdlab.show.story import (
-    TEMPLATES,
-    check_story,
-    story_sentence,
-    story_sentences,
-    story_to_dict,
-)
 
 import mutants
 from trdlab.decomposition import RewardDecomposition, TimeAxis

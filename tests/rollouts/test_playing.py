@@ -7,6 +7,7 @@ import pytest
 
 from trdlab.agents import Agent, gridworld_agent
 from trdlab.decomposition import TimeAxis
+from trdlab.environments import Environments
 from trdlab.errors import InputError
 from trdlab.explanations import assess
 from trdlab.policies import Memoryless
@@ -66,3 +67,23 @@ def test_it_is_told_how_far_episodes_are():
     done = [progress.finished for progress in first]
     assert done == sorted(done)
     assert done[-1] == 12
+
+
+@pytest.mark.parametrize(
+    ("name", "epsilon", "played", "judged_by"),
+    [
+        ("drone", 0.0, [60], 1),  # all alike: no more of them, and that one once
+        ("drone", None, [60, 300], 300),  # then with some random actions
+        ("ledge", None, [60, 240], 300),
+        ("drone", 0.1, [300], 300),
+    ],
+)
+def test_episodes_that_are_all_alike_are_not_played_again(name, epsilon, played, judged_by):
+    agent, made = gridworld_agent(name, AXIS), []
+
+    def make(num_envs: int, seed: int) -> Environments:
+        made.append(num_envs)
+        return agent.make(num_envs, seed)
+
+    report = assess(replace(agent, make=make), episodes=300, epsilon=epsilon)
+    assert (made, report.num_episodes) == (played, judged_by)

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+import by_hand
 from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
@@ -49,8 +50,9 @@ def test_a_summary_answers_what_why_not_how_far_and_whose():
     assert "first reward to be expected of down is that of t+1: 1 on average" in what
     assert "with γ = 0.95 down is worth 3.52 and up 3.26." in why_not
     assert "Down gives more immediate rewards than up" in why_not
-    assert "As forecast, down paid more than up in all" in why_not
-    assert how_far.startswith("The forecast can be trusted ")
+    assert "As forecast, down was worth 0.266 more than up; 0.266 was forecast." in why_not
+    assert how_far.startswith("It scored 4 in its one episode")
+    assert "Its forecasts are better than a guess about what comes within 4 steps." in how_far
     assert whose.startswith("After the first action it is the future of the optimal policy")
 
 
@@ -66,8 +68,8 @@ def test_the_plain_data_has_the_numbers_and_their_sentences():
     kinds = [finding["kind"] for finding in moment["findings"]]
     assert "better" in kinds
     assert "first-step-cost" not in kinds  # that is of the forecast
-    assert calibration["schema"] == "trdlab.trust/1"
-    assert calibration["episodes"] == 100
+    assert calibration["schema"] == "trdlab.trust/2"
+    assert calibration["judged"]["episodes"] == 100
     assert found.report is not None
     np.testing.assert_array_equal(
         np.array(calibration["calibration"]["skill"]["low"], dtype=float),
@@ -75,8 +77,8 @@ def test_the_plain_data_has_the_numbers_and_their_sentences():
     )
     assert len(calibration["ceiling"]["skill"]["value"]) == 5
     assert calibration["trusted"]["last_step"] == found.report.trust.last_step
-    text = " ".join(finding["sentence"] for finding in calibration["findings"])
-    assert len(check_explained(text, found)) == len(calibration["findings"])
+    told = [claim["sentence"] for of in calibration["sections"] for claim in of["findings"]]
+    assert len(check_explained(" ".join(told), found)) == len(told)
 
 
 def test_what_was_not_asked_for_is_null():
@@ -94,8 +96,8 @@ def test_bars_that_are_not_to_be_trusted_are_faded():
     explanation, report = found.explanation, found.report
     assert explanation is not None
     assert report is not None
-    trust = replace(report.trust, components=2, residual=True)
-    of_foils = replace(report.trust, components=3, residual=False)
+    trust = by_hand.trusted(report.time_axis, 2, residual=True)
+    of_foils = by_hand.trusted(report.time_axis, 3)
     moment = replace(explanation.moment, trust=trust, foil_trust=of_foils)
     figure = moment_figure(replace(explanation, moment=moment), explanation.foil, "ledge")
     figure.canvas.draw()

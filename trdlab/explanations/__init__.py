@@ -8,9 +8,7 @@ if TYPE_CHECKING:
     from trdlab.explanations.assessment import assess, moment_at
     from trdlab.explanations.calibration.calibration import Calibration, calibrate
     from trdlab.explanations.calibration.ceiling import Ceiling
-    from trdlab.explanations.calibration.findings import trust_findings
-    from trdlab.explanations.calibration.report import TrustReport, judge
-    from trdlab.explanations.calibration.sentences import check_trust, trust_sentences
+    from trdlab.explanations.calibration.report import CalibrationReport, judge
     from trdlab.explanations.calibration.trust import Trust
     from trdlab.explanations.claims import Finding
     from trdlab.explanations.comparison.compare import compare, find_pair
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Calibration",
+    "CalibrationReport",
     "Ceiling",
     "Comparison",
     "Explained",
@@ -38,14 +37,12 @@ __all__ = [
     "Revision",
     "Story",
     "Trust",
-    "TrustReport",
     "Uncertainty",
     "UnsupportedSentenceError",
     "WhatIf",
     "assess",
     "calibrate",
     "check",
-    "check_trust",
     "compare",
     "explain",
     "explain_agent",
@@ -61,8 +58,6 @@ __all__ = [
     "sentences",
     "tabular_moment",
     "tell",
-    "trust_findings",
-    "trust_sentences",
 ]
 
 _HOMES = {
@@ -92,16 +87,13 @@ _HOMES = {
     "revise": "episode.revision",
     "Story": "episode.story",
     "tell": "episode.story",
-    "trust_findings": "calibration.findings",
-    "TrustReport": "calibration.report",
+    "CalibrationReport": "calibration.report",
     "judge": "calibration.report",
     "Trust": "calibration.trust",
-    "UnsupportedSentenceError": "slots",
+    "UnsupportedSentenceError": "rules",
     "check": "moment.sentences",
     "sentence": "moment.sentences",
     "sentences": "moment.sentences",
-    "check_trust": "calibration.sentences",
-    "trust_sentences": "calibration.sentences",
 }
 
 __getattr__ = lazily(__name__, _HOMES)

@@ -1,6 +1,5 @@
 """Assessing an agent: its episodes are played, and what it expected is judged by what came."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeGuard
 
@@ -9,15 +8,16 @@ import numpy as np
 from trdlab.agents.agent import Agent
 from trdlab.environments import CopyableEnvironments, Environments, NotCopyable
 from trdlab.errors import InputError
-from trdlab.explanations.calibration.report import TrustReport, judge
+from trdlab.explanations.calibration.report import CalibrationReport, judge
+from trdlab.explanations.calibration.score import score_of
 from trdlab.explanations.moment.exact import exact_moment
 from trdlab.explanations.moment.moment import Moment, moment_of
 from trdlab.explanations.moment.outcome import Trial
-from trdlab.intervals import FEWEST_EPISODES
 from trdlab.rollouts.branches import Branches, Branching, Copying, TooFewMoments
 from trdlab.rollouts.counterfactual import counterfactual
 from trdlab.rollouts.episodes import Episode
 from trdlab.rollouts.playing import Watch, decide, play_to, unwatched
+from trdlab.statistics import FEWEST_EPISODES
 from trdlab.tabular import ExactTable
 
 FOLLOWED = 100
@@ -33,7 +33,7 @@ def assess(
     copying: Copying | None = None,
     seed: int = 1000,
     watch: Watch = unwatched,
-) -> TrustReport:
+) -> CalibrationReport:
     """Plays episodes of an agent, and judges what it expected by what came.
 
     Where neither the agent nor its environments know chance, all episodes are the same one, of
@@ -62,7 +62,8 @@ def assess(
 
     chance = epsilon or 0.0
     played = played_with(chance, "episodes to judge by")
-    if epsilon is None and _different(played) < min(FEWEST_EPISODES, episodes):
+    score = score_of(played, seed=seed)
+    if epsilon is None and score.different < min(FEWEST_EPISODES, episodes):
         chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
         played = played_with(chance, "episodes with some random actions")
     length = float(np.mean([len(episode) for episode in played]))
@@ -75,13 +76,21 @@ def assess(
         agent.estimator.future,
         played,
         *(copied or ()),
+        score=score,
         seconds_per_step=agent.seconds_per_step,
         seed=seed,
     )
 
 
 def try_out(
-    agent: Agent, action: str, foil: str, *, seed: int = 0, step: int = 0, copies: int | None = None
+    agent: Agent,
+    action: str,
+    foil: str,
+    *,
+    seed: int = 0,
+    step: int = 0,
+    copies: int | None = None,
+    report: CalibrationReport | None = None,
 ) -> Trial | None:
     """Tries two actions at a step of an agent's episode, each from copies of the state.
 
@@ -95,6 +104,7 @@ def try_out(
         seed: of the episode.
         step: of that episode.
         copies: how often each is tried, by default as the agent's `copying` says.
+        report: on the agent, which knows what rewards can come.
 
     Returns:
         What was forecast and what came; None where states cannot be copied.
@@ -117,6 +127,7 @@ def try_out(
             agent.action_names.index(action),
             agent.action_names.index(foil),
             age=step,
+            seen=None if report is None else report.seen,
             seed=seed,
         )
     except NotCopyable:
@@ -150,16 +161,6 @@ def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:
     moment = moment_of(agent.estimator, stack.observations[0], agent.action_names)
     policy = np.asarray(chosen, dtype=np.float64)
     return replace(moment, policy=policy, seconds_per_step=agent.seconds_per_step)
-
-
-def _different(episodes: Sequence[Episode]) -> int:
-    """Returns how many episodes are not the same as another one."""
-    return len(
-        {
-            (e.actions.tobytes(), e.rewards.tobytes(), np.asarray(e.expected).tobytes())
-            for e in episodes
-        }
-    )
 
 
 def _copied(

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 from trdlab.agents.agent import Agent
 from trdlab.errors import InputError, closest
 from trdlab.explanations.assessment import assess, moment_at, try_out
-from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.episode.played import play
 from trdlab.explanations.episode.story import Story, tell
 from trdlab.explanations.moment.explanation import Explanation, explain
@@ -49,7 +49,7 @@ class Explained:
     seed: int
     step: int
     explanation: Explanation | None
-    report: TrustReport | None
+    report: CalibrationReport | None
     trial: Trial | None = None
     story: Story | None = None
     max_steps: int | None = None
@@ -125,7 +125,7 @@ def explain_agent(
     if moment is not None and report is not None:
         moment = judged(moment, report)
     if "contrast" in wanted and pair[0] is not None and pair[1] is not None:
-        trial = try_out(agent, pair[0], pair[1], seed=seed, step=step)
+        trial = try_out(agent, pair[0], pair[1], seed=seed, step=step, report=report)
     return Explained(
         agent=agent,
         parts=parts,

@@ -18,14 +18,21 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     Numbers: `number` (2.71), `gives` and `pays` (gives 2.71, gives nothing, costs 0.5), `estimate`,
     `percent`, `given` (what the user gave: all its digits), `roots`, `count`, `steps`, `episodes`,
     `times`, `states`. Whether a mean is meant: `average` (of `True`: it is sure; nothing is said).
-    Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `within`
-    (up to a step: at once, within 4 steps), `next` (the next 4 steps), `step` (of an episode).
+    Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `span`
+    (from one to another: in 3 to 5 steps), `within` (up to a step: at once, within 4 steps),
+    `next` (the next 4 steps), `step` (of an episode).
     Names: `action`, `names`, `text`.
 
     Args:
         axis: what components mean.
         seconds: how long a step takes as people play, if that is known.
     """
+
+    def span(components: tuple[int, int]) -> str:
+        first, last = components
+        steps = axis.steps(last)
+        until = steps[-1] + 1 if axis.start(first) == 0 and steps not in (None, range(1)) else 0
+        return span_of(axis, first, last) + _played(until or axis.start(first), seconds)
 
     def when(component: int) -> str:
         return when_of(axis, component) + _played(axis.start(component), seconds)
@@ -54,6 +61,7 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "times": _of(lambda count: "once" if count == 1 else f"{count:,} times"),
         "when": _of(when),
         "whens": _of(lambda components: joined([when(i) for i in components])),
+        "span": _of(span),
         "within": _of(within),
         "next": _of(lambda count: "the next step" if count == 1 else f"the next {count:,} steps"),
         "step": _of(lambda step: f"step {step:,}"),
@@ -69,14 +77,23 @@ def when_of(axis: TimeAxis, component: int) -> str:
     >>> [when_of(grouped, i) for i in (0, 1, 2)]
     ['within 2 steps', 'in 2 to 3 steps', 'in 4 steps or later']
     """
-    start, steps = axis.start(component), axis.steps(component)
+    return span_of(axis, component, component)
+
+
+def span_of(axis: TimeAxis, first: int, last: int) -> str:
+    """Returns when some components in a row come, counted from now, as people say it.
+
+    >>> axis = TimeAxis(0.9, 4)
+    >>> [span_of(axis, *of) for of in ((0, 2), (2, 3), (2, 4), (0, 4))]
+    ['within 3 steps', 'in 2 to 3 steps', 'in 2 steps or later', 'at any time']
+    """
+    start, steps = axis.start(first), axis.steps(last)
     if steps is None:
         return f"in {counted(start, 'step')} or later" if start else "at any time"
-    if axis.width == 1:
+    end = steps[-1]
+    if start == end:
         return "now" if start == 0 else f"in {counted(start, 'step')}"
-    if start == 0:
-        return f"within {axis.width:,} steps"
-    return f"in {start:,} to {steps[-1]:,} steps"
+    return f"within {end + 1:,} steps" if start == 0 else f"in {start:,} to {end:,} steps"
 
 
 def counted(count: int, noun: str) -> str:
@@ -109,7 +126,7 @@ def _does(value: float, digits: int, gives: str) -> str:
 
 
 def _estimate(of: Estimate, digits: int) -> str:
-    if of.low == of.high:
+    if not of.low < of.high:  # where there is no chance, or no interval
         return said(of.value, digits)
     return f"{said(of.value, digits)} ({said(of.low, digits)} to {said(of.high, digits)})"
 

@@ -83,10 +83,6 @@ TEMPLATES: dict[type[Claim], str] = {
         "Too few different episodes tell how far to trust the forecasts of {side:side}: "
         "{episodes:count}."
     ),
-    background.TrustedUntested: (
-        "The forecasts of {side:side} cannot be trusted beyond {step:until}, and up to there the "
-        "reward was always the same."
-    ),
     background.NeverTested: (
         "There was nothing to predict in the episodes of {side:side}: the reward was always the "
         "same."

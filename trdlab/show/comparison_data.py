@@ -3,11 +3,12 @@
 from dataclasses import asdict
 from typing import Any
 
+from trdlab.explanations.calibration.claims import to_dict
 from trdlab.explanations.comparison.findings import comparison_findings
 from trdlab.explanations.comparison.report import SIDES, Comparison
-from trdlab.intervals import Estimates
+from trdlab.explanations.rules import plain_data
 from trdlab.show.comparison import FURTHEST, LANGUAGE, explain_command
-from trdlab.show.trust_data import plain_data, trust_to_dict
+from trdlab.statistics import Estimates
 
 SCHEMA = "trdlab.compare/1"
 
@@ -50,7 +51,7 @@ def comparison_to_dict(comparison: Comparison) -> dict[str, Any]:
             for finding in comparison_findings(comparison)
         ],
         "calibration": {
-            side: None if report is None else trust_to_dict(report)
+            side: None if report is None else to_dict(report)
             for side, report in zip(SIDES, comparison.reports, strict=True)
         },
     }

@@ -6,34 +6,23 @@ from typing import Any
 
 from rich.console import Group, RenderableType
 
-from trdlab.explanations.calibration.findings import trust_findings
-from trdlab.explanations.calibration.report import TrustReport
-from trdlab.explanations.calibration.sentences import REPORTS, trust_sentence
-from trdlab.explanations.claims import Claim, Finding
+from trdlab.explanations.calibration import claims as calibrations
+from trdlab.explanations.calibration.faults import REPORTS
+from trdlab.explanations.claims import Finding
 from trdlab.explanations.explained import FIELDS, PARTS, Explained
+from trdlab.explanations.moment import outcome
 from trdlab.explanations.moment.contrast import in_short
 from trdlab.explanations.moment.explanation import Explanation
-from trdlab.explanations.moment.outcome import Trial, trial_findings
 from trdlab.explanations.moment.sentences import MOMENTS, sentence
-from trdlab.explanations.moment.trials import TRIALS, trial_sentence, trial_sentences
+from trdlab.explanations.rules import plain_data
 from trdlab.explanations.slots import Language, checked, split
 from trdlab.show.page import action_table, paragraph, story
 from trdlab.show.report import actions_to_dict
 from trdlab.show.story import STORIES, story_lines, story_sentence, story_to_dict
-from trdlab.show.trust_data import plain_data, trust_to_dict
 from trdlab.time_axis import axis_title
 
 SCHEMA = "trdlab.explanations/1"
 
-_FAULTS = (
-    "too-late",
-    "too-early",
-    "amount-off",
-    "discount-off",
-    "goes-on-in-next",
-    "goes-on-after-end",
-)
-_OUTCOMES = ("came-in-all", "missed-in-all", "open-in-all", "missed-at")
 _NOT_TRIED = "It was not: the states of this environment cannot be copied."
 _MOST_OF_EACH = 2  # sentences of a kind, where only what matters most is told
 
@@ -70,7 +59,8 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
         lines.append(story(explanation, sections=_fields(explained), ascii_only=ascii_only))
     if "contrast" in explained.parts:
         add("Tried out", "bold")
-        for text in [_NOT_TRIED] if explained.trial is None else trial_sentences(explained.trial):
+        tried = None if explained.trial is None else outcome.sections(explained.trial)
+        for text in (_NOT_TRIED,) if tried is None else tried[0].sentences:
             add(text, indent=2)
     if explained.story is not None:
         add(f"The episode with seed {explained.seed}", "bold")
@@ -79,11 +69,12 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
         add("t is the step that a sentence names; the first one is step 0.", "dim", 2)
         add(_whose(explained), "dim", 2)
         if "calibration" not in explained.parts and explained.report is not None:
-            add(_trust(explained.report)[0], "dim", 2)
+            add(calibrations.verdicts(explained.report)[0].sentence, "dim", 2)
     if "calibration" in explained.parts and explained.report is not None:
-        add("How far its forecasts can be trusted", "bold")
-        for text in _trust(explained.report):
-            add(text, indent=2)
+        for section in calibrations.sections(explained.report):
+            add(section.heading, "bold")
+            for text in section.sentences:
+                add(text, indent=2)
     return Group(*lines)
 
 
@@ -113,26 +104,22 @@ def summary(explained: Explained) -> list[Section]:
         sections[f"What {explanation.action} promises"] = promises
         sections[f"Why not {explanation.foil}"] = [
             *_told(in_short(explanation.contrast), explanation),
-            *(() if explained.trial is None else _outcomes(explained.trial)),
+            *(
+                claim.sentence
+                for claim in ([] if explained.trial is None else outcome.in_brief(explained.trial))
+            ),
         ]
     if told is not None and told.most is not None:
         sections["What surprised it in this episode"] = [story_sentence(told.most, told.played)]
     if report is not None:
-        found = trust_findings(report)
-        shown = [x for i, x in enumerate(found) if i < _MOST_OF_EACH or x.kind() in _FAULTS]
-        sections["How far to trust it"] = [trust_sentence(finding, report) for finding in shown]
+        shown = calibrations.in_brief(report)
+        sections["How far to trust it"] = [claim.sentence for claim in shown]
     if explanation is not None:
         sections["Whose future"] = _told(explanation.context[:1], explanation)
     return [Section(heading, tuple(texts)) for heading, texts in sections.items() if texts]
 
 
-def _outcomes(trial: Trial) -> list[str]:
-    """Returns what matters most of two actions that were tried."""
-    found = [finding for finding in trial_findings(trial) if finding.kind() in _OUTCOMES]
-    return [trial_sentence(finding, trial) for finding in found]
-
-
-def check_explained(text: str, explained: Explained) -> list[Claim]:
+def check_explained(text: str, explained: Explained) -> list[Any]:
     """Reads rendered sentences back, tests each against what it speaks of, and returns the claims.
 
     Args:
@@ -142,14 +129,18 @@ def check_explained(text: str, explained: Explained) -> list[Claim]:
     Raises:
         UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
     """
+    rules = [(REPORTS, explained.report), (outcome.TRIALS, explained.trial)]
     subjects: tuple[tuple[Language[Any], Any], ...] = (
         (MOMENTS, explained.explanation),
-        (REPORTS, explained.report),
-        (TRIALS, explained.trial),
         (STORIES, None if explained.story is None else explained.story.played),
     )
     known = [(language, subject) for language, subject in subjects if subject is not None]
-    return [checked(piece, known) for piece in split(text)]
+
+    def true(piece: str) -> Any:
+        found = (rule.true(piece, of) for rule, of in rules if of is not None)  # type: ignore[arg-type]
+        return next((claim for claim in found if claim is not None), None)
+
+    return [true(piece) or checked(piece, known) for piece in split(text)]
 
 
 def to_dict(explained: Explained) -> dict[str, Any]:
@@ -184,26 +175,11 @@ def to_dict(explained: Explained) -> dict[str, Any]:
         "future": asdict(explained.agent.estimator.future),
         "summary": [asdict(section) for section in summary(explained)],
         "moment": moment,
-        "trial": None if explained.trial is None else _trial_to_dict(explained.trial),
+        "trial": None if explained.trial is None else explained.trial.to_dict(),
         "episode": None
         if explained.story is None
         else {"seed": explained.seed} | story_to_dict(explained.story),
-        "calibration": None if report is None else trust_to_dict(report),
-    }
-
-
-def _trial_to_dict(trial: Trial) -> dict[str, Any]:
-    return {
-        "action": trial.action,
-        "foil": trial.foil,
-        "copies": trial.found.copies,
-        "scope": trial.scope,
-        "predicted": plain_data(trial.found.predicted),
-        "observed": plain_data(trial.found.observed),
-        "findings": [
-            plain_data(finding.to_dict()) | {"sentence": trial_sentence(finding, trial)}
-            for finding in trial_findings(trial)
-        ],
+        "calibration": None if report is None else calibrations.to_dict(report),
     }
 
 
@@ -239,8 +215,8 @@ def _setting(explained: Explained) -> str:
 def _is_cut_off(explained: Explained) -> bool:
     """Returns whether an episode was cut off by us, and not by a limit of its environment."""
     report, told, cut = explained.report, explained.story, set()
-    if report is not None and report.endings.truncated:
-        cut.add(report.endings.time_limit)
+    if report is not None and report.judged.truncated:
+        cut.add(report.judged.time_limit)
     if told is not None and not told.played.episode.terminated:
         cut.add(told.played.episode.time_limit)
     return explained.max_steps in cut - {None}
@@ -253,7 +229,3 @@ def _whose(explained: Explained) -> str:
 
 def _told(findings: Sequence[Finding], explanation: Explanation) -> list[str]:
     return [sentence(finding, explanation) for finding in findings]
-
-
-def _trust(report: TrustReport) -> list[str]:
-    return [trust_sentence(finding, report) for finding in trust_findings(report)]

@@ -11,9 +11,9 @@ from trdlab.explanations.claims import Claim, Shown
 from trdlab.explanations.episode import promises, story, surprises
 from trdlab.explanations.episode.played import Played, StoryClaim
 from trdlab.explanations.episode.story import Story, first_end
+from trdlab.explanations.rules import plain_data
 from trdlab.explanations.slots import Form, Language, forms_of
 from trdlab.formatting import amount, number
-from trdlab.show.trust_data import plain_data
 from trdlab.time_axis import TimeAxis
 
 _TURNED = "{action} at step {step:count} turned out {gap:gap} {outcome:outcome} than expected"

@@ -17,14 +17,12 @@ from trdlab.cli import main
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations import assess
-from trdlab.explanations.calibration.report import TrustReport
-from trdlab.explanations.calibration.trust import trust
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison.compare import compare, find_pair
 from trdlab.explanations.comparison.differences import ComparisonFinding
 from trdlab.explanations.comparison.findings import comparison_findings
 from trdlab.explanations.comparison.report import Comparison, compared
 from trdlab.explanations.comparison.states import Visits
-from trdlab.intervals import Estimates
 from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page
 from trdlab.show.comparison_data import comparison_to_dict
 from trdlab.show.plots.comparison import comparison_figure
@@ -53,7 +51,7 @@ WORDS = {
 
 
 @cache
-def reports() -> tuple[TrustReport | None, ...]:
+def reports() -> tuple[CalibrationReport | None, ...]:
     """Six reports with six different verdicts, and none."""
     axis = TimeAxis(0.95, 3)
     agent = gridworld_agent("ledge,slip=0.3,exploring_starts=true", axis)
@@ -80,21 +78,10 @@ def reports() -> tuple[TrustReport | None, ...]:
     return (*found, constant_at_first(last), assess(agent, episodes=5), None)
 
 
-def constant_at_first(report: TrustReport) -> TrustReport:
+def constant_at_first(report: CalibrationReport) -> CalibrationReport:
     """Returns a report that differs in that the first reward was always the same."""
-    old = report.calibration
-    first = np.arange(len(old.states)) == 0
-    calibration = replace(
-        old,
-        states=("nothing to predict", *old.states[1:]),
-        error=Estimates(*(np.where(first, 0.0, end) for end in ends(old.error))),
-        skill=Estimates(*(np.where(first, np.nan, end) for end in ends(old.skill))),
-    )
-    return replace(report, calibration=calibration, trust=trust(calibration))
-
-
-def ends(found: Estimates) -> tuple[np.ndarray, ...]:
-    return found.value, found.low, found.high
+    status = ("not tested", *report.calibration.status[1:])
+    return replace(report, calibration=replace(report.calibration, status=status))
 
 
 @st.composite
@@ -278,7 +265,7 @@ def test_the_plain_data_has_the_numbers_and_their_sentences():
     means = [data["agents"][side]["mean"]["value"] for side in "AB"]
     np.testing.assert_allclose(np.subtract(*means[::-1]), data["difference"]["value"], atol=1e-12)
     assert sum(data["difference"]["value"]) == pytest.approx(data["gap"]["value"])
-    assert data["calibration"]["A"]["schema"] == "trdlab.trust/1"
+    assert data["calibration"]["A"]["schema"] == "trdlab.trust/2"
     text = " ".join(finding["sentence"] for finding in data["findings"])
     assert len(check_comparison(text, real()[0])) == len(data["findings"])
 

@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 
+import by_hand
 from trdlab.agents.agent import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
@@ -13,7 +14,6 @@ from trdlab.estimator import Future
 from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import check, explain_agent, sentences
 from trdlab.explanations.calibration.report import judge
-from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.claims import Finding
 from trdlab.explanations.moment import (
     chances,
@@ -333,7 +333,7 @@ def test_wrong_actions_are_refused(options: dict[str, str], message: str):
 
 def judged_moment(rows: list[list[float]], trusted: int, residual: bool, **known: Any) -> Moment:
     told = moment(rows)
-    trust = Trust(told.time_axis, trusted, trusted, trusted, residual)
+    trust = by_hand.trusted(told.time_axis, trusted, residual)
     return replace(told, trust=trust, **known)
 
 
@@ -392,7 +392,7 @@ def test_an_expected_reward_is_a_chance_only_where_one_reward_or_none_comes(amou
 
 def test_no_chance_is_read_from_a_group():
     grouped = moment([[0.0, 0.8, 0.0]], width=3)
-    trust = Trust(grouped.time_axis, 2, 2, 2, residual=True)
+    trust = by_hand.trusted(grouped.time_axis, 2, residual=True)
     explanation = explain(replace(grouped, trust=trust, only_reward=1.0), "a")
     assert not found(chances.PutAt, explanation)
 
@@ -423,7 +423,7 @@ def test_a_moment_is_judged_by_a_report():
     play = ModelEnvironments(world.mdp, 40, seed=0, time_limit=60)
     report = judge(table.future, collect(table, play))
     there = judged(gridworld_moment(world, table, 0), report)
-    assert there.trust is report.trust
+    assert there.trust == report.trust
     assert there.error is not None
     known = np.isfinite(there.error)
     assert known.any()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import peak_prominences
 
+import by_hand
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations import explain, sentence
-from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.claims import Finding
 from trdlab.explanations.moment.exact import gridworld_moment
 from trdlab.explanations.moment.moment import Moment
@@ -33,7 +33,7 @@ def learned(row: np.ndarray, width: int = 1, trusted: int | None = None, **known
     axis = TimeAxis(0.95, len(row) - 1, width)
     trust = None
     if trusted is not None:
-        trust = Trust(axis, trusted, trusted, trusted, residual=False)
+        trust = by_hand.trusted(axis, trusted)
     components = RewardDecomposition((row * axis.discounts)[None], axis)
     return Moment(components, ("go",), Future("the greedy policy"), trust=trust, **known)  # type: ignore[arg-type]
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mutants
+from by_hand import trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.claims import Finding
 from trdlab.explanations.moment.contrast import in_short
 from trdlab.explanations.moment.exact import gridworld_moment, tabular_moment
@@ -120,8 +120,8 @@ def moments(draw: st.DrawFn) -> Moment:
         return decomposition.value + slope * (value - 0.95) * np.arange(actions)
 
     components = draw(st.integers(0, horizon))
-    trust = Trust(axis, components, horizon, draw(st.integers(0, components)), draw(st.booleans()))
-    foil_trust = Trust(axis, max(0, components - 1), horizon, 0, draw(st.booleans()))
+    trust = trusted(axis, components, draw(st.booleans()))
+    foil_trust = trusted(axis, max(0, components - 1), draw(st.booleans()))
     off_by = [0.01, 0.2, 0.3, 0.5, 0.7, 2.0, 4.0, 9.0, np.nan, np.nan]
     errors = draw(st.permutations(off_by))[: horizon + 1]
     return Moment(
@@ -170,7 +170,7 @@ def of_learned() -> list[Explanation]:
             bumps = sum(np.exp(-((steps - place) ** 2) / 4.0) for place in places)
             row = size * bumps + slope * (1.0 - steps / 40) + rng.normal(0.0, 0.02, 41)
             rows = np.stack([row, np.roll(row, 2)]) * axis.discounts
-            trust = Trust(axis, 36, 40, 36, residual=False)
+            trust = trusted(axis, 36)
             told = Moment(
                 RewardDecomposition(rows, axis),
                 NAMES[:2],
@@ -181,7 +181,7 @@ def of_learned() -> list[Explanation]:
                 seconds_per_step=0.1,
             )
             result.append(explain(told, *NAMES[:2]))
-            near = replace(told, trust=Trust(axis, 1, 40, 1, residual=False))
+            near = replace(told, trust=trusted(axis, 1))
             result.append(explain(near, *NAMES[:2]))
     return result
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trdlab.explanations.calibration import verdicts
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison.differences import ComparisonFinding, side_of
 from trdlab.explanations.comparison.report import Comparison
 
@@ -14,9 +14,8 @@ class _Trusted(ComparisonFinding):
 
     side: str
 
-    def _says(self, comparison: Comparison, verdict: verdicts.TrustFinding) -> bool:
-        report = comparison.reports[side_of(self.side)]
-        return report is not None and verdict.holds(report)
+    def _report(self, comparison: Comparison) -> CalibrationReport | None:
+        return comparison.reports[side_of(self.side)]
 
 
 class TrustedUpTo(_Trusted):
@@ -25,7 +24,8 @@ class TrustedUpTo(_Trusted):
     step: int
 
     def holds(self, comparison: Comparison) -> bool:
-        return self._says(comparison, verdicts.TrustedTo(self.step))
+        report = self._report(comparison)
+        return report is not None and self.step == report.trust.last_step and not _whole(report)
 
 
 class TrustedAllAlong(_Trusted):
@@ -34,42 +34,44 @@ class TrustedAllAlong(_Trusted):
     step: int
 
     def holds(self, comparison: Comparison) -> bool:
-        return self._says(comparison, verdicts.TrustedThroughout(self.step))
+        report = self._report(comparison)
+        return report is not None and self.step == report.trust.last_step and _whole(report)
 
 
 class TrustedNowhere(_Trusted):
-    """At no step, though enough episodes tell of the first one."""
+    """At no step: the first one already is surely no better than a guess, or wrong."""
 
     def holds(self, comparison: Comparison) -> bool:
-        report = comparison.reports[side_of(self.side)]
-        is_told = report is not None and report.calibration.states[0] != "too few episodes"
-        return is_told and self._says(comparison, verdicts.NotTrusted())
+        report = self._report(comparison)
+        return report is not None and _first(report) == "bad"
 
 
 class TooFewToJudge(_Trusted):
-    """At no step, and that is because too few different episodes tell of the first one."""
+    """Too few different episodes tell whether the first step can be trusted."""
 
     episodes: int
 
     def holds(self, comparison: Comparison) -> bool:
-        few = self._says(comparison, verdicts.TooFewAt(0, self.episodes))
-        return few and self._says(comparison, verdicts.NotTrusted())
-
-
-class TrustedUntested(_Trusted):
-    """Up to a step, where the reward was always the same, and no further."""
-
-    step: int
-
-    def holds(self, comparison: Comparison) -> bool:
-        return self._says(comparison, verdicts.ConstantTo(self.step))
+        report = self._report(comparison)
+        few = report is not None and _first(report) == "open"
+        return few and self.episodes == report.calibration.num_episodes[0]  # type: ignore[union-attr]
 
 
 class NeverTested(_Trusted):
-    """The reward was always the same in its episodes."""
+    """No reward came at the first step in its episodes, or none is known of."""
 
     def holds(self, comparison: Comparison) -> bool:
-        return self._says(comparison, verdicts.NothingTested())
+        report = self._report(comparison)
+        return report is not None and _first(report) == "not tested"
+
+
+def _whole(report: CalibrationReport) -> bool:
+    return report.trust.is_whole
+
+
+def _first(report: CalibrationReport) -> str | None:
+    """Returns the status of the first explicit component, if there is one."""
+    return report.calibration.status[0] if report.time_axis.horizon else None
 
 
 # ---- what it rests on ---------------------------------------------------------------------------

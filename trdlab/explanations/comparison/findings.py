@@ -2,21 +2,12 @@
 
 import numpy as np
 
-from trdlab.explanations.calibration.findings import trust_findings
 from trdlab.explanations.comparison import background, differences
 from trdlab.explanations.comparison.differences import ComparisonFinding
 from trdlab.explanations.comparison.report import SIDES, Comparison
 
 NOTABLE = 0.05
 """The least lead, as a share of all that is expected, that makes one agent later worth telling."""
-
-_VERDICTS = {
-    "trusted-to": background.TrustedUpTo,
-    "trusted-throughout": background.TrustedAllAlong,
-    "not-trusted": background.TrustedNowhere,
-    "constant-to": background.TrustedUntested,
-    "nothing-tested": background.NeverTested,
-}
 
 Findings = tuple[ComparisonFinding, ...]
 
@@ -130,14 +121,17 @@ def furthest(comparison: Comparison, m: int) -> differences.FurthestApart:
 def _trust(comparison: Comparison) -> Findings:
     found: list[ComparisonFinding] = []
     for side, report in zip(SIDES, comparison.reports, strict=True):
-        told = {} if report is None else {x.kind(): x.to_dict() for x in trust_findings(report)}
-        if "not-trusted" in told and "too-few-at" in told:
-            found.append(background.TooFewToJudge(side, told["too-few-at"]["episodes"]))
+        if report is None:
             continue
-        for kind, claim in _VERDICTS.items():
-            if kind in told:
-                del told[kind]["kind"]
-                found.append(claim(side, **told[kind]))
+        step = report.trust.last_step or 0
+        claims = (
+            background.TrustedUpTo(side, step),
+            background.TrustedAllAlong(side, step),
+            background.TrustedNowhere(side),
+            background.TooFewToJudge(side, int(report.calibration.num_episodes[0])),
+            background.NeverTested(side),
+        )
+        found += [claim for claim in claims if claim.holds(comparison)]
     return tuple(found)
 
 

@@ -11,13 +11,13 @@ from trdlab.explanations.moment.moment import Moment
 
 if TYPE_CHECKING:
     from trdlab.explanations.calibration.calibration import Calibration
-    from trdlab.explanations.calibration.report import TrustReport
+    from trdlab.explanations.calibration.report import CalibrationReport
     from trdlab.explanations.calibration.trust import Trust
 
 LEAST_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25  # what is smaller cannot be taken out
 
 
-def judged(moment: Moment, report: "TrustReport") -> Moment:
+def judged(moment: Moment, report: "CalibrationReport") -> Moment:
     """Returns a moment with what a report knows of such forecasts.
 
     That is how far they can be trusted, what they are off by, and whether rewards are of one kind.

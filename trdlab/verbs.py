@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from trdlab.agents.places import Where
     from trdlab.deep.settings import Kind
     from trdlab.deep.trainer import TrainMetrics
-    from trdlab.explanations.calibration.report import TrustReport
+    from trdlab.explanations.calibration.report import CalibrationReport
     from trdlab.explanations.comparison.comparison import Comparison
     from trdlab.explanations.explanation import Explanation
     from trdlab.policies import Who
@@ -184,7 +184,7 @@ def calibrate(
     max_steps: int | None = None,
     seed: int = 1000,
     watch: "Watch | None" = None,
-) -> "TrustReport":
+) -> "CalibrationReport":
     """Says how far ahead an agent's expectations can be trusted, by episodes that it plays.
 
     Args:

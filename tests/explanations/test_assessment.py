@@ -13,6 +13,7 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Environments, GymEnvironments
 from trdlab.errors import InputError
 from trdlab.explanations import assess, check, explain, moment_at, sentences
+from trdlab.explanations.calibration.faults import faults
 from trdlab.policies import Memoryless
 from trdlab.rollouts import Copying, collect
 from trdlab.tabular import MDP, ExactTable, ModelEnvironments, exact
@@ -29,10 +30,10 @@ def slippery(tmp_path: Path, slip: float) -> str:
 def test_an_exact_table_is_trusted_over_its_whole_horizon():
     report = assess(gridworld_agent("ledge", AXIS), episodes=300, copying=Copying())
     assert report.trust.is_whole
-    assert report.epsilon == 0.0
-    assert report.blame is not None
-    assert report.blame.shift == 0
-    assert not report.faults
+    assert report.judged.epsilon == 0.0
+    assert report.errors is not None
+    assert report.errors.shift == 0
+    assert faults(report) == []
     assert report.ceiling is not None
     skill, limit = report.calibration.skill, report.ceiling.skill
     assert (skill.low <= limit.high)[:-1].all()
@@ -41,15 +42,16 @@ def test_an_exact_table_is_trusted_over_its_whole_horizon():
 
 def test_where_all_episodes_are_the_same_some_actions_are_random():
     report = assess(gridworld_agent("drone", AXIS), episodes=60, copying=Copying())
-    assert report.epsilon == 1.0 / 6.0
+    assert (report.judged.epsilon, report.score.epsilon) == (1.0 / 6.0, 0.0)
+    assert (report.score.different, report.score.returns.value) == (1, 4.0)
     assert report.trust.is_whole
     assert report.calibration.error.value[:-1].max() == pytest.approx(0.0, abs=1e-20)
     assert report.ceiling is not None
     assert report.ceiling.deterministic
     told = assess(gridworld_agent("drone", AXIS), episodes=60, epsilon=0.0)
-    assert told.epsilon == 0.0
+    assert told.judged.epsilon == 0.0
     assert told.trust.last_step is None
-    assert set(told.calibration.states) == {"too few episodes"}
+    assert set(told.calibration.status) == {"open"}
 
 
 def test_copies_that_were_not_followed_do_not_tell_that_there_is_no_chance():
@@ -133,7 +135,7 @@ def test_moments_are_found_in_short_episodes_beside_a_few_that_never_end(seed):
     report = assess(agent, episodes=60, max_steps=400, copying=Copying(episodes=2), seed=seed)
     assert report.ceiling is not None
     assert report.ceiling.num_moments >= 2
-    assert report.endings.truncated > 0
+    assert report.judged.truncated > 0
 
 
 def test_a_step_is_of_the_episode_that_the_story_tells():

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from trdlab.explanations.assessment import assess, moment_at, try_out
     from trdlab.explanations.calibration.calibration import Calibration, calibrate
     from trdlab.explanations.calibration.ceiling import Ceiling
-    from trdlab.explanations.calibration.report import TrustReport, judge
+    from trdlab.explanations.calibration.report import CalibrationReport, judge
     from trdlab.explanations.calibration.trust import Trust
     from trdlab.explanations.comparison.comparing import compare
     from trdlab.explanations.comparison.comparison import Comparison
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Calibration",
+    "CalibrationReport",
     "Ceiling",
     "Choice",
     "Claim",
@@ -39,7 +40,6 @@ __all__ = [
     "Story",
     "Trial",
     "Trust",
-    "TrustReport",
     "Uncertainty",
     "UnsupportedSentenceError",
     "WhatIf",
@@ -87,7 +87,7 @@ _HOMES = {
     "Calibration": "calibration.calibration",
     "calibrate": "calibration.calibration",
     "Ceiling": "calibration.ceiling",
-    "TrustReport": "calibration.report",
+    "CalibrationReport": "calibration.report",
     "judge": "calibration.report",
     "Trust": "calibration.trust",
     "Trial": "moment.outcome",

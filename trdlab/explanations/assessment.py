@@ -11,15 +11,16 @@ from trdlab.decomposition import RewardDecomposition
 from trdlab.environments import NotCopyable, NotParallel
 from trdlab.errors import InputError
 from trdlab.explanations.calibration.calibration import Calibration
-from trdlab.explanations.calibration.report import TrustReport, judge
+from trdlab.explanations.calibration.report import CalibrationReport, judge
+from trdlab.explanations.calibration.score import score_of
 from trdlab.explanations.moment.exact import exact_moment
 from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.outcome import Trial
-from trdlab.intervals import FEWEST_EPISODES
 from trdlab.rollouts.branches import Branches, Branching, Copying, TooFewMoments
-from trdlab.rollouts.counterfactual import counterfactual
+from trdlab.rollouts.counterfactual import compared, try_actions
 from trdlab.rollouts.episodes import Episode
 from trdlab.rollouts.playing import Playing, Progress, Watch, can_be_copied, unwatched
+from trdlab.statistics import FEWEST_EPISODES
 from trdlab.tabular import ExactTable
 
 FOLLOWED = 100
@@ -137,7 +138,7 @@ def assess(
     copying: Copying | None = None,
     seed: int = 1000,
     watch: Watch = unwatched,
-) -> TrustReport:
+) -> CalibrationReport:
     """Plays episodes of an agent, and judges what it expected by what came.
 
     Where neither the agent nor its environments know chance, all episodes are the same one, of
@@ -162,8 +163,10 @@ def assess(
     judging, chance = _Judging(agent, max_steps, seed, watch), epsilon or 0.0
     if chance:
         played = judging.played(chance, episodes, of=episodes)
+        score = score_of(played, seed=seed)
     else:
         played, alike = judging.alike(episodes)
+        score = score_of(played, seed=seed)
         if alike and epsilon is None:
             chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
             played = judging.played(chance, episodes, of=episodes)
@@ -176,6 +179,7 @@ def assess(
         played,
         copied.branches,
         copied.foils,
+        score=score,
         seconds_per_step=agent.seconds_per_step,
         seed=seed,
     )
@@ -222,7 +226,7 @@ def moment_of_play(agent: Agent, playing: Playing) -> Moment:
     )
 
 
-def judged(moment: Moment, report: TrustReport) -> Moment:
+def judged(moment: Moment, report: CalibrationReport) -> Moment:
     """Returns a moment with what a report knows of such forecasts.
 
     That is how far they can be trusted, what they are off by, and whether rewards are of one kind.
@@ -248,7 +252,14 @@ def _root_mean_square(calibration: Calibration) -> FloatArray:
 
 
 def try_out(
-    agent: Agent, action: str, foil: str, *, seed: int = 0, step: int = 0, copies: int | None = None
+    agent: Agent,
+    action: str,
+    foil: str,
+    *,
+    seed: int = 0,
+    step: int = 0,
+    copies: int | None = None,
+    report: CalibrationReport | None = None,
 ) -> Trial:
     """Tries two actions at a step of an agent's episode, each from copies of the state.
 
@@ -259,6 +270,7 @@ def try_out(
         seed: of the episode.
         step: of that episode.
         copies: how often each is tried, by default as the agent's `copying` says.
+        report: on the agent, which knows what rewards can come.
 
     Raises:
         InputError: there is no such step or action, or both are the same.
@@ -266,13 +278,15 @@ def try_out(
     """
     with agent.begin(seed=seed) as recording:
         recording.play_to(step)
-        return try_out_in_play(agent, recording.playing, action, foil, seed=seed, copies=copies)
+        playing = recording.playing
+        tried = try_in_play(agent, playing, action, foil, seed=seed, copies=copies)
+    return trial_of(agent, tried, report, seed=seed)
 
 
-def try_out_in_play(
+def try_in_play(
     agent: Agent, playing: Playing, action: str, foil: str, *, seed: int, copies: int | None = None
-) -> Trial:
-    """Tries two actions where the first of an agent's episodes stands, as `try_out` does.
+) -> tuple[Branches, Branches]:
+    """Returns what follows two actions where the first of an agent's episodes stands.
 
     The copies are followed until all have ended, but no further than `FOLLOWED` steps or the
     explicit components, whichever is more.
@@ -281,7 +295,18 @@ def try_out_in_play(
     tries = agent.copying.tries if copies is None else copies
     branching = Branching(agent.estimator, agent.policy, tries, steps)
     numbers = (agent.action_names.index(name) for name in (action, foil))
-    found = counterfactual(branching, playing, *numbers, seed=seed)
+    return try_actions(branching, playing, *numbers, seed=seed)
+
+
+def trial_of(
+    agent: Agent,
+    tried: tuple[Branches, Branches],
+    report: CalibrationReport | None,
+    *,
+    seed: int,
+) -> Trial:
+    """Returns how two actions differ that an agent tried, held against what it knows otherwise."""
+    found = compared(tried, None if report is None else report.seen, seed=seed)
     return Trial(found, agent.action_names, agent.seconds_per_step)
 
 

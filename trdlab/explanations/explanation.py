@@ -11,11 +11,10 @@ from trdlab.explanations.assessment import (
     assess,
     judged,
     moment_of_play,
-    try_out_in_play,
     usual_episodes,
 )
 from trdlab.explanations.calibration import claims as calibration
-from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import Story, tell
 from trdlab.explanations.moment import outcome, telling
@@ -34,7 +33,7 @@ _OF_PART: dict[Part, tuple[str, ...]] = {
     "forecast": ("forecast", "context"),
     "contrast": ("contrast", "flips", "trial", "context"),
     "episode": ("episode",),
-    "calibration": ("calibration",),
+    "calibration": ("score", "trust", "faults", "later", "others", "judged"),
 }
 
 
@@ -62,7 +61,7 @@ class Explanation(Printable):
     seed: int
     step: int
     choice: Choice | None
-    report: TrustReport | None
+    report: CalibrationReport | None
     trial: Trial | None = None
     story: Story | None = None
     max_steps: int | None = None
@@ -154,7 +153,7 @@ def explain(
     if "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
     copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
-    choice, state, trial, story, report = None, None, None, None, None
+    choice, state, tried, story, report = None, None, None, None, None
     missing: list[str] = []
     with agent.begin(seed=seed, max_steps=limit) as recording:
         if {"forecast", "contrast"} & set(wanted):
@@ -170,7 +169,7 @@ def explain(
         if "contrast" in wanted and choice is not None and choice.foil is not None:
             try:
                 pair = (choice.action, choice.foil)
-                trial = try_out_in_play(agent, recording.playing, *pair, seed=seed)
+                tried = try_in_play(agent, recording.playing, *pair, seed=seed)
             except NotCopyable as error:
                 missing.append(f"{error.cause} So the two actions were not tried out.")
         if "episode" in wanted:
@@ -189,7 +188,7 @@ def explain(
         step=step,
         choice=choice,
         report=report,
-        trial=trial,
+        trial=None if tried is None else trial_of(agent, tried, report, seed=seed),
         story=story,
         max_steps=limit,
         missing=tuple(missing),

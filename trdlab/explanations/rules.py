@@ -218,6 +218,6 @@ def plain_data(value: Any) -> Any:
 
 @cache
 def _skeleton(says: str) -> re.Pattern[str]:
-    """Returns the pattern of a rule's sentences: any text in its slots."""
+    """Returns the pattern of a rule's sentences: any text in its slots, or none."""
     pieces = [re.escape(text) for text in re.split(r"\{[^}]*\}", says)]
     return re.compile("(.*)".join(pieces), re.IGNORECASE)  # a slot may begin the sentence

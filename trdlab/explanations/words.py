@@ -19,7 +19,8 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     `percent`, `given` (by the user: all its digits), `roots`, `tenths`, `count`, `steps`,
     `episodes`, `times`, `states`. What is said where a flag asks for it: `average` and `averages`
     (unless it is sure), `worth`, `net`, `ties`.
-    Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `within`
+    Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `span` (from one to another),
+    `within`
     (up to a step: in the first step, within 4 steps), `next` (the next 4 steps), `step`.
     Names: `action`, `names`, `text`.
 
@@ -27,6 +28,12 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         axis: what components mean.
         seconds: how long a step takes as people play, if that is known.
     """
+
+    def span(components: tuple[int, int]) -> str:
+        first, last = components
+        steps = axis.steps(last)
+        until = steps[-1] + 1 if axis.start(first) == 0 and steps not in (None, range(1)) else 0
+        return span_of(axis, first, last) + _played(until or axis.start(first), seconds)
 
     def when(component: int) -> str:
         return when_of(axis, component) + _played(axis.start(component), seconds)
@@ -60,6 +67,7 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "times": _of(lambda count: "once" if count == 1 else f"{count:,} times"),
         "when": _of(when),
         "whens": _of(lambda components: joined(whens_of(axis, components))),
+        "span": _of(span),
         "within": _of(within),
         "next": _of(lambda count: "the next step" if count == 1 else f"the next {count:,} steps"),
         "step": _of(lambda step: f"step {step:,}"),
@@ -75,14 +83,23 @@ def when_of(axis: TimeAxis, component: int) -> str:
     >>> [when_of(grouped, i) for i in (0, 1, 2)]
     ['within 2 steps', 'in 2 to 3 steps', 'in 4 steps or later']
     """
-    start, steps = axis.start(component), axis.steps(component)
+    return span_of(axis, component, component)
+
+
+def span_of(axis: TimeAxis, first: int, last: int) -> str:
+    """Returns when some components in a row come, counted from now, as people say it.
+
+    >>> axis = TimeAxis(0.9, 4)
+    >>> [span_of(axis, *of) for of in ((0, 2), (2, 3), (2, 4), (0, 4))]
+    ['within 3 steps', 'in 2 to 3 steps', 'in 2 steps or later', 'at any time']
+    """
+    start, steps = axis.start(first), axis.steps(last)
     if steps is None:
         return f"in {counted(start, 'step')} or later" if start else "at any time"
-    if axis.width == 1:
+    end = steps[-1]
+    if start == end:
         return "now" if start == 0 else f"in {counted(start, 'step')}"
-    if start == 0:
-        return f"within {axis.width:,} steps"
-    return f"in {start:,} to {steps[-1]:,} steps"
+    return f"within {end + 1:,} steps" if start == 0 else f"in {start:,} to {end:,} steps"
 
 
 def whens_of(axis: TimeAxis, components: Sequence[int]) -> list[str]:
@@ -97,16 +114,7 @@ def whens_of(axis: TimeAxis, components: Sequence[int]) -> list[str]:
             runs[-1].append(i)
         else:
             runs.append([i])
-    return [_run_of(axis, run[0], run[-1]) for run in runs]
-
-
-def _run_of(axis: TimeAxis, first: int, last: int) -> str:
-    begins, steps = axis.start(first), axis.steps(last)
-    if first == last or steps is None:
-        return when_of(axis, first) if first == last else f"in {counted(begins, 'step')} or later"
-    if begins == 0:
-        return f"within {steps[-1] + 1:,} steps"
-    return f"in {begins:,} to {steps[-1]:,} steps"
+    return [span_of(axis, run[0], run[-1]) for run in runs]
 
 
 def counted(count: int, noun: str) -> str:
@@ -139,7 +147,7 @@ def _does(value: float, digits: int, gives: str) -> str:
 
 
 def _estimate(of: Estimate, digits: int) -> str:
-    if of.low == of.high:
+    if not of.low < of.high:  # where there is no chance, or no interval
         return said(of.value, digits)
     return f"{said(of.value, digits)} ({said(of.low, digits)} to {said(of.high, digits)})"
 

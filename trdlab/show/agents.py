@@ -7,18 +7,16 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration import claims as calibration
-from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison import claims as comparing
 from trdlab.explanations.comparison.comparison import SIDES, Comparison
 from trdlab.explanations.explanation import Explanation
-from trdlab.explanations.moment.outcome import Trial
 from trdlab.explanations.rules import plain_data
 from trdlab.formatting import decimals_for, number
-from trdlab.intervals import Estimates
 from trdlab.show.data import actions_data, axis_data, data, sections_data
 from trdlab.show.document import Document, axis_words, document
 from trdlab.show.scenes import scene_of
-from trdlab.statistics import Estimate
+from trdlab.statistics import Estimate, Estimates
 
 _MOST_ROWS = 8  # of a table of components
 
@@ -48,10 +46,10 @@ def _(explanation: Explanation) -> Document:
 
 
 @document.register
-def _(report: TrustReport) -> Document:
+def _(report: CalibrationReport) -> Document:
     told = calibration.in_brief(report)
     return Document(
-        heading=f"How far its forecasts can be trusted · {report.num_episodes} episodes",
+        heading=f"How far its forecasts can be trusted · {report.judged.episodes} episodes",
         setting=axis_words(report.time_axis),
         answer=tuple(claim.sentence for claim in told),
         sections=calibration.sections(report),
@@ -74,8 +72,8 @@ def _(comparison: Comparison) -> Document:
 def _played(explanation: Explanation) -> list[str]:
     """Returns how long a step takes, and where episodes were cut off by us."""
     report, story, cut = explanation.report, explanation.story, set()
-    if report is not None and report.endings.truncated:
-        cut.add(report.endings.time_limit)
+    if report is not None and report.judged.truncated:
+        cut.add(report.judged.time_limit)
     if story is not None and not story.played.episode.terminated:
         cut.add(story.played.episode.time_limit)
     words = _seconds(explanation.agent.seconds_per_step)
@@ -135,10 +133,13 @@ def _(explanation: Explanation) -> dict[str, Any]:
         "answer": [claim.to_dict() for claim in explanation.answer],
         "sections": sections_data(explanation.sections),
         "moment": moment,
-        "trial": None if trial is None else _trial(trial),
+        "trial": None if trial is None else trial.to_dict(),
         "episode": None if explanation.story is None else _episode(explanation),
         "calibration": None if report is None else data(report),
     }
+
+
+data.register(CalibrationReport, calibration.to_dict)
 
 
 @data.register
@@ -175,16 +176,6 @@ def _(comparison: Comparison) -> dict[str, Any]:
 
 def _of_side(means: Estimates, side: int) -> Estimates:
     return Estimates(means.value[side], means.low[side], means.high[side])
-
-
-def _trial(trial: Trial) -> dict[str, Any]:
-    return {
-        "action": trial.action,
-        "foil": trial.foil,
-        "copies": trial.found.copies,
-        "predicted": plain_data(trial.found.predicted),
-        "observed": plain_data(trial.found.observed),
-    }
 
 
 def _episode(explanation: Explanation) -> dict[str, Any]:

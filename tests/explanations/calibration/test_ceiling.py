@@ -7,19 +7,19 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from by_hand import occupancy
+from by_hand import exact_ceiling, occupancy
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import GymEnvironments
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations.calibration.calibration import calibrate
-from trdlab.explanations.calibration.ceiling import ceiling, exact_ceiling
+from trdlab.explanations.calibration.ceiling import ceiling_of
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.intervals import Estimates
 from trdlab.rollouts.branches import Branching
 from trdlab.rollouts.counterfactual import counterfactual
 from trdlab.rollouts.episodes import Recording, collect
+from trdlab.statistics import Estimates
 from trdlab.tabular import ExactTable, ModelEnvironments, exact, from_environment
 
 AXIS = TimeAxis(0.95, 12)
@@ -60,7 +60,7 @@ def test_model_environments_draw_from_the_model_and_are_restored_to_the_bit():
 def test_the_ceiling_of_an_exact_model_is_found_from_copies():
     environments = ModelEnvironments(bridge().mdp, 300, seed=101)
     branches = Branching(bridge(), copies=6, steps=300).along(environments, every=3)
-    found = ceiling(branches)
+    found = ceiling_of(branches)
     true = exact_ceiling(bridge(), occupancy(bridge()))
     assert inside(found.skill, true) >= 0.8
     assert np.abs(found.skill.value - true).max() < 0.06
@@ -79,7 +79,7 @@ def test_where_a_coin_decides_the_ceiling_is_zero():
     fair = [(0.5, 0, 1.0, False), (0.5, 0, 0.0, False)]
     table = exact(MDP.from_transitions([[fair]]), TimeAxis(0.9, 3))
     environments = ModelEnvironments(table.mdp, 100, seed=0, time_limit=40)
-    found = ceiling(Branching(table, copies=4).along(environments, every=5)).skill
+    found = ceiling_of(Branching(table, copies=4).along(environments, every=5)).skill
     assert np.abs(found.value[:3]).max() < 0.1
     assert ((found.low <= 0.0) & (found.high >= 0.0))[:3].all()
 
@@ -96,7 +96,7 @@ def test_gymnasium_environments_are_copied_with_fresh_chance():
     branches = Branching(table, copies=3).along(
         GymEnvironments("FrozenLake-v1", 12, seed=0), every=10
     )
-    assert not ceiling(branches, resamples=50).deterministic
+    assert not ceiling_of(branches).deterministic
 
 
 def test_without_chance_the_ceiling_says_so():
@@ -110,7 +110,7 @@ def test_without_chance_the_ceiling_says_so():
             components[:, 1, 0] = observations[:, 2]  # pushes to where the pole leans
             return RewardDecomposition(components, self.time_axis)
 
-    found = ceiling(Branching(Sway(), copies=2).along(cart, every=7), resamples=50)
+    found = ceiling_of(Branching(Sway(), copies=2).along(cart, every=7))
     assert found.deterministic
     assert found.skill.value[3] == pytest.approx(1.0)
     assert np.isnan(found.skill.value[0])  # 1 at every step: nothing varies
@@ -153,4 +153,4 @@ def test_counterfactuals_refuse_what_is_not_there():
     with pytest.raises(InputError, match="reach 12 steps"):
         Branching(table, steps=5)
     with pytest.raises(InputError, match="at least 2 of both"):
-        ceiling(Branching(table, copies=1).along(environments, every=2))
+        ceiling_of(Branching(table, copies=1).along(environments, every=2))

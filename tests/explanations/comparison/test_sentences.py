@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from trdlab.explanations.comparison.differences import ComparisonFinding
 from trdlab.explanations.comparison.findings import comparison_findings
+from trdlab.intervals import Estimates
 from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page
 from trdlab.show.comparison_data import comparison_to_dict
 
@@ -26,7 +27,6 @@ from trdlab.explanations.calibration.trust import trust
 from trdlab.explanations.comparison.comparing import compare
 from trdlab.explanations.comparison.comparison import Comparison, compared
 from trdlab.explanations.comparison.states import Visits
-from trdlab.intervals import Estimates
 from trdlab.policies import Memoryless
 from trdlab.show.plots.comparison import comparison_figure
 from trdlab.tabular import ExactTable

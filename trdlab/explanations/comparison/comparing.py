@@ -5,7 +5,7 @@ from dataclasses import replace
 from trdlab.agents.agent import Agent
 from trdlab.errors import InputError
 from trdlab.explanations.assessment import assess, usual_episodes
-from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison.comparison import SIDES, Comparison, compared
 from trdlab.explanations.comparison.states import visit
 from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
@@ -58,7 +58,7 @@ def compare(
     visits = visit(
         players, episodes=count, seed=seed, most_states=most_states, max_steps=limit, watch=watch
     )
-    reports: list[TrustReport | None] = []
+    reports: list[CalibrationReport | None] = []
     for side, agent in zip(SIDES, players, strict=True):
 
         def tell(progress: Progress, side: str = side) -> None:

@@ -8,21 +8,19 @@ import numpy as np
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison.states import Visits
 from trdlab.explanations.rules import Language
 from trdlab.explanations.words import forms_of
-from trdlab.intervals import (
+from trdlab.printable import Printable
+from trdlab.statistics import (
     FEWEST_EPISODES,
-    LEVEL,
-    RESAMPLES,
+    Estimate,
     Estimates,
     draws,
     percentiles,
     pooled,
 )
-from trdlab.printable import Printable
-from trdlab.statistics import Estimate
 
 SIDES = ("A", "B")
 """What the two are called."""
@@ -69,7 +67,7 @@ class Comparison(Printable):
     gap: Estimate
     shift: Estimate
     agreement: Estimate
-    reports: tuple[TrustReport | None, TrustReport | None] = (None, None)
+    reports: tuple[CalibrationReport | None, CalibrationReport | None] = (None, None)
     max_steps: int | None = None
     seconds_per_step: float | None = None
 
@@ -116,9 +114,9 @@ def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
         one, other = (centre(means[:, i * size : (i + 1) * size], visits.time_axis) for i in (0, 1))
         return np.column_stack([means, gap, other - one])
 
-    drawn = draws(len(sums), RESAMPLES, np.random.default_rng(seed))
+    drawn = draws(len(sums), seed)
     values = statistics(pooled(drawn, sums))
-    found = percentiles(values, LEVEL, visits.different >= FEWEST_EPISODES)
+    found = percentiles(values, visits.different >= FEWEST_EPISODES)
     exists = ~np.isnan(found.value)
     found = found.where(exists, exists)
     parts = [_part(found, slice(i * size, (i + 1) * size)) for i in range(5)]

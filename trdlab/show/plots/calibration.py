@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration.reliability import Reliability
-from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.formatting import amount
 from trdlab.show.plots.steps_axis import STEPS, label_steps, positions
 from trdlab.time_axis import axis_title, step_label
@@ -20,7 +20,7 @@ _LOWEST = -0.5  # skill below this is shown as an arrow at the edge
 _GAP = 1.0  # between the explicit components and the residual, in components
 
 
-def plot_trust(ax: Axes, report: TrustReport) -> Axes:
+def plot_trust(ax: Axes, report: CalibrationReport) -> Axes:
     """Draws the skill of every component with its interval, and how far it can be trusted.
 
     The trusted range is shaded. Where there was nothing to predict stands a small ring on the line
@@ -48,9 +48,10 @@ def plot_trust(ax: Axes, report: TrustReport) -> Axes:
     if below.any():
         lowest = np.full(below.sum(), _LOWEST)
         ax.plot(x[below], lowest, "v", color=_SKILL, markersize=6, clip_on=False)
-    constant = found.is_("nothing to predict")
-    _mark(ax, x[constant], "o", "nothing to predict")
-    _mark(ax, x[~constant & ~found.is_("judged")], "x", "not known, or too few episodes")
+    told = ~np.isnan(found.skill.low)
+    _mark(ax, x[found.constant & found.is_("good")], "o", "always the same, and right")
+    _mark(ax, x[found.is_("not tested")], ".", "not tested")
+    _mark(ax, x[~told & (found.is_("open") | found.is_("bad"))], "x", "wrong, or too few episodes")
     _dress(ax, report, x)
     return ax
 
@@ -88,7 +89,7 @@ def plot_reliability(ax: Axes, found: Reliability) -> Axes:
     return ax
 
 
-def _shade(ax: Axes, report: TrustReport) -> None:
+def _shade(ax: Axes, report: CalibrationReport) -> None:
     trusted = report.trust
     if trusted.last_step is None:
         return
@@ -134,14 +135,14 @@ def _mark(ax: Axes, x: FloatArray, marker: str, label: str) -> None:
         )
 
 
-def _dress(ax: Axes, report: TrustReport, x: FloatArray) -> None:
+def _dress(ax: Axes, report: CalibrationReport, x: FloatArray) -> None:
     axis = report.time_axis
     label_steps(ax, axis, x)
     ax.set(xlim=(-0.6, x[-1] + 0.6), ylim=(_LOWEST, 1.12), yticks=(-0.5, 0.0, 0.5, 1.0))
     ax.set_xlabel(STEPS, fontsize=9, color=_MUTED)
     ax.set_ylabel("skill (1: perfect,\n0: a constant guess)", fontsize=9, color=_MUTED)
     ax.set_title(
-        f"{axis_title(axis)} · {report.num_episodes} episodes",
+        f"{axis_title(axis)} · {report.judged.episodes} episodes",
         fontsize=9,
         color=_MUTED,
         loc="right",

@@ -9,10 +9,9 @@ from matplotlib.patches import Patch
 
 from trdlab.decomposition import TimeAxis
 from trdlab.explanations.comparison.comparison import Comparison
-from trdlab.intervals import Estimates
-from trdlab.show.comparison import titles
 from trdlab.show.plots.pictures import check_pictures
 from trdlab.show.plots.steps_axis import STEPS, cut_off, label_steps, positions, room_for
+from trdlab.statistics import Estimates
 from trdlab.time_axis import axis_title
 
 NAME = "comparison.png"

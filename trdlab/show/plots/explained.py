@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from trdlab.arrays import FloatArray
-from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.explained import PARTS, Explained, Part
 from trdlab.explanations.moment.explanation import Explanation
 from trdlab.explanations.moment.leads import difference
@@ -192,7 +192,7 @@ def plot_trial(ax: Axes, trial: Trial) -> Axes:
     return ax
 
 
-def trust_figure(report: TrustReport, title: str) -> Figure:
+def trust_figure(report: CalibrationReport, title: str) -> Figure:
     """Returns the skill of every component, and how far a forecast can be trusted.
 
     Where rewards are either 0 or one amount, how often it came stands beside it.

@@ -55,9 +55,9 @@ class Future:
     def ending(self) -> str:
         """What ends it, in words."""
         return {
-            (False, False): "terminal states",
+            (False, False): "the end of the episode",
             (True, False): "a lost life, or the end of the game",
-            (False, True): "terminal states, or the time limit",
+            (False, True): "the end of the episode, or the time limit",
             (True, True): "a lost life, the end of the game, or the time limit",
         }[self.life_loss_ends, self.time_limit_ends]
 

@@ -11,6 +11,8 @@ from trdlab.explanations.assessment import (
     assess,
     judged,
     moment_of_play,
+    trial_of,
+    try_in_play,
     usual_episodes,
 )
 from trdlab.explanations.calibration import claims as calibration

@@ -19,9 +19,9 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     `percent`, `given` (by the user: all its digits), `roots`, `tenths`, `count`, `steps`,
     `episodes`, `times`, `states`. What is said where a flag asks for it: `average` and `averages`
     (unless it is sure), `worth`, `net`, `ties`.
-    Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `span` (from one to another),
-    `within`
-    (up to a step: in the first step, within 4 steps), `next` (the next 4 steps), `step`.
+    Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `span`
+    (from one to another), `within` (up to a step: in the first step, within 4 steps), `next` (the
+    next 4 steps), `step`.
     Names: `action`, `names`, `text`.
 
     Args:

@@ -29,7 +29,7 @@ def _(explanation: Explanation) -> Document:
         heading.append(f"step {explanation.step} of the episode with seed {explanation.seed}")
     elif explanation.story is not None:
         heading.append(f"the episode with seed {explanation.seed}")
-    drawing, legend = "", ()
+    drawing, legend = "", tuple[str, ...]()
     if explanation.state is not None and agent.world is not None:
         scene = scene_of(agent.world, explanation.state)
         drawing, legend = scene.drawing, scene.legend

@@ -42,8 +42,13 @@ def columns() -> int:
 def plain_ascii(shown: Text) -> Text:
     """Returns a text that any terminal can print."""
     translated = shown.copy()
-    translated.plain = shown.plain.translate(_ASCII).encode("ascii", "replace").decode()
+    translated.plain = fit(shown.plain, ascii_only=True)
     return translated
+
+
+def fit(line: str, *, ascii_only: bool) -> str:
+    """Returns a line that any terminal can print, if it has to be."""
+    return line.translate(_ASCII).encode("ascii", "replace").decode() if ascii_only else line
 
 
 def _lines(page: Document, width: int, *, details: bool) -> Iterator[Text]:

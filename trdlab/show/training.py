@@ -11,7 +11,7 @@ from trdlab.errors import InputError
 from trdlab.formatting import decimals_for
 from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary, to_toml
-from trdlab.show.page import fit
+from trdlab.show.text import fit
 from trdlab.training.setup import Plan
 
 

@@ -7,7 +7,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from trdlab.explain.copies import ModelEnvironments
 
 from by_hand import Given, episode, exact_tails, occupancy
 from trdlab.arrays import FloatArray

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-from trdlab.explain.copies import ModelEnvironments
 
 import mutants
 from by_hand import episode

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from trdlab.explain.copies import ModelEnvironments
 
 from by_hand import Given, episode
 from trdlab.arrays import FloatArray

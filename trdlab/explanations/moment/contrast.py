@@ -161,8 +161,8 @@ def same_components(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "{share:percent} of the difference between {action} and {foil} lies where such forecasts were "
-    "not found to be right."
+    "{share:percent} of the difference between {action} and {foil} comes {components:whens}, and "
+    "that {state:text}."
 )
 def untested_difference(choice: Choice) -> Iterator[Fields]:
     for action, foil in choice.orders[:1]:
@@ -170,7 +170,13 @@ def untested_difference(choice: Choice) -> Iterator[Fields]:
         doubt = doubtful(choice.moment, action) | doubtful(choice.moment, foil)
         share = float(size[doubt].sum() / size.sum()) if size.any() else 0.0
         if share > _MOST_DOUBT:
-            yield {"share": share, "action": action, "foil": foil}
+            components = tuple(np.flatnonzero(doubt & (size > 0.0)).tolist())
+            states = {
+                choice.moment.status_of(name)[i] for name in (action, foil) for i in components
+            }
+            state = "was not tested" if states <= {"good", "not tested"} else "is not to be trusted"
+            about = {"share": share, "action": action, "foil": foil, "state": state}
+            yield about | {"components": components}
 
 
 @CHOICES.rule(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.arrays import RELATIVE_ZERO, BoolArray, FloatArray, IntArray
 from trdlab.explanations.moment.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
@@ -38,7 +38,7 @@ def tabular_moment(
         action_names=tuple(action_names),
         future=table.future,
         policy=solution.policy[state],
-        totals=undiscounted_totals(mdp, solution.policy)[state],
+        totals=_totals(table, state),
         stays=_stays(mdp, state),
         is_over=bool(mdp.terminal_states[state]),
         tied=tuple(name for name, is_tied in tied if is_tied),
@@ -46,6 +46,13 @@ def tabular_moment(
         what_ifs=tuple(what_ifs),
         uncertainty=_uncertainty(table, state),
     )
+
+
+def _totals(table: ExactTable, state: int) -> FloatArray:
+    """Returns `[A]`: the undiscounted totals, 0 where rewards and costs cancel but for rounding."""
+    totals = undiscounted_totals(table.mdp, table.solution.policy)[state]
+    size = np.abs(table.decomposition.components[state]).sum(axis=-1)  # [A]
+    return np.where(np.abs(totals) <= RELATIVE_ZERO * size, 0.0, totals)
 
 
 def _stays(mdp: MDP, state: int) -> tuple[float, ...]:

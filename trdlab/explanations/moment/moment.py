@@ -15,6 +15,7 @@ from trdlab.explanations.rules import Language
 from trdlab.explanations.words import forms_of
 
 if TYPE_CHECKING:
+    from trdlab.explanations.calibration.calibration import Status
     from trdlab.explanations.calibration.trust import Trust
 
 
@@ -155,6 +156,12 @@ class Moment:
     def trust_of(self, action: str) -> "Trust | None":
         """Returns how far forecasts of such an action can be trusted, if that has been judged."""
         return self.foil_trust if self._is_judged_foil(action) else self.trust
+
+    def status_of(self, action: str) -> "tuple[Status, ...]":
+        """Returns N+1 of good, bad, open or not tested; all not tested where nothing is judged."""
+        trust = self.trust_of(action)
+        nothing: Status = "not tested"
+        return (nothing,) * self.time_axis.num_components if trust is None else trust.status
 
     def error_of(self, action: str) -> FloatArray | None:
         """`[N+1]`: what forecasts of such an action are off by, if that has been judged."""

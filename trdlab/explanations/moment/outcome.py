@@ -131,13 +131,23 @@ def _includes(came: Estimate, value: float) -> bool:
     return came.low - slack <= value <= came.high + slack
 
 
+@rule("As forecast, {more} {component:paid} {said:number} more than {less}{component:at}.")
+def came_exactly(trial: Trial) -> Iterator[Fields]:
+    """There is no chance, and it is what was forecast."""
+    for gap in trial.gaps():
+        came = gap["came"]
+        if came.low == came.high > 0.0 and _includes(came, gap["said"]):
+            yield gap
+
+
 @rule(
     "As forecast, {more} {component:paid} {came:estimate} more than {less}{component:at}; "
     "{said:number} was forecast."
 )
 def came_as_forecast(trial: Trial) -> Iterator[Fields]:
     for gap in trial.gaps():
-        if gap["came"].low > 0.0 and _includes(gap["came"], gap["said"]):
+        is_certain = gap["came"].low == gap["came"].high
+        if gap["came"].low > 0.0 and _includes(gap["came"], gap["said"]) and not is_certain:
             yield gap
 
 
@@ -173,8 +183,8 @@ def against_the_forecast(trial: Trial) -> Iterator[Fields]:
 
 
 @rule(
-    "Against the forecast, {more} {component:paid} no more than {less}{component:at}; {said:number} "
-    "more was forecast."
+    "Against the forecast, {more} {component:paid} no more than {less}{component:at}; "
+    "{said:number} more was forecast."
 )
 def no_difference(trial: Trial) -> Iterator[Fields]:
     for gap in trial.gaps():
@@ -210,6 +220,7 @@ def too_close_to_tell(trial: Trial) -> Iterator[Fields]:
 # ---- what is told --------------------------------------------------------------------------------
 
 _OUTCOMES = (
+    came_exactly,
     came_as_forecast,
     by_another_amount,
     less_than_forecast,

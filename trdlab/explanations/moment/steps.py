@@ -20,19 +20,19 @@ Effect = Literal["reward", "cost"]
 
 
 def doubtful(moment: Moment, action: str) -> BoolArray:
-    """Returns `[N+1]`: what is not to be trusted of an action; nothing where that is not judged."""
+    """Returns `[N+1]`: what is not to be trusted of an action.
+
+    That is nothing where it has not been judged, nor of an exact table, which needs no tests.
+    """
     trust = moment.trust_of(action)
-    if trust is None:
+    if trust is None or moment.is_exact:
         return np.zeros(moment.time_axis.num_components, dtype=np.bool_)
     return trust.doubtful
 
 
 def speaks_of_all(moment: Moment, action: str) -> bool:
-    """Returns whether all components of an action can be told of: trusted, or of an exact table.
-
-    Short episodes of such a table may not have shown what it knows of the residual.
-    """
-    return moment.is_exact or not doubtful(moment, action).any()
+    """Returns whether all components of an action can be told of."""
+    return not doubtful(moment, action).any()
 
 
 def explicit_end(moment: Moment, action: str) -> int:

@@ -90,7 +90,7 @@ def counted_as(choice: Choice) -> Iterator[Fields]:
     yield {"reward": choice.moment.future.reward}
 
 
-@CHOICES.rule("Its future ends at {ending:text}.")
+@CHOICES.rule("It looks ahead to {ending:text}.")
 def ended_by(choice: Choice) -> Iterator[Fields]:
     yield {"ending": choice.moment.future.ending}
 

@@ -1,5 +1,6 @@
 """trdlab: when does an agent expect which reward, and how far can that be trusted?"""
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,14 @@ _HOMES = {
 }
 
 __getattr__ = lazily(__name__, _HOMES)
+
+# A command started from a notebook inherits the notebook's backend, which may not be installed
+# here, and then matplotlib could not even be imported.
+if os.environ.get("MPLBACKEND", "").startswith("module://"):
+    from importlib.util import find_spec
+
+    if find_spec(os.environ["MPLBACKEND"].removeprefix("module://").partition(".")[0]) is None:
+        del os.environ["MPLBACKEND"]
 
 # Whoever has imported Gymnasium will want to `make` our maps; nobody else should pay for it.
 if "gymnasium" in sys.modules:

@@ -87,7 +87,7 @@ def publish(
     from trdlab.show import report as show
 
     if plot is not None:
-        from trdlab.show.plots.moment import check_picture
+        from trdlab.show.plots.style import check_picture
 
         check_picture(plot, overwrite=overwrite)
     report = solve()
@@ -97,9 +97,10 @@ def publish(
         console, ascii_only = new_console()
         console.print(show.page(report, ascii_only=ascii_only))
     if plot is not None:
-        from trdlab.show.plots.moment import save_report
+        from trdlab.show.plots.map import report_figure
+        from trdlab.show.plots.style import save
 
-        save_report(report, plot)
+        save(report_figure(report), plot)
         Console(stderr=True, highlight=False).print(
             f"Picture: {plot}", soft_wrap=True, markup=False
         )

@@ -101,7 +101,7 @@ def explain(
 
         out = free_name(Path("explanations"), found.name)
     if out is not None:
-        from trdlab.show.plots.explained import picture_paths
+        from trdlab.show.plots.figures import picture_paths
 
         paths = picture_paths(out, parts, seed=seed, step=step)
     errors = Console(stderr=True, highlight=False)
@@ -123,7 +123,7 @@ def explain(
         console, ascii_only = common.new_console()
         console.print(show.page(explained, ascii_only=ascii_only))
     if out is not None:
-        from trdlab.show.plots.explained import write_pictures
+        from trdlab.show.plots.figures import write_pictures
 
         for path in write_pictures(explained, paths):
             errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

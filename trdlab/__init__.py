@@ -4,6 +4,7 @@ The verbs: `solve` a model, `train` a network, or name an `agent`; then `calibra
 `compare` it. The nouns: `Agent`, `Estimator`, `Future`, `RewardDecomposition`, `TimeAxis`.
 """
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -53,6 +54,14 @@ _HOMES = {
 }
 
 __getattr__ = lazily(__name__, _HOMES)
+
+# A command started from a notebook inherits the notebook's backend, which may not be installed
+# here, and then matplotlib could not even be imported.
+if os.environ.get("MPLBACKEND", "").startswith("module://"):
+    from importlib.util import find_spec
+
+    if find_spec(os.environ["MPLBACKEND"].removeprefix("module://").partition(".")[0]) is None:
+        del os.environ["MPLBACKEND"]
 
 # Whoever has imported Gymnasium will want to `make` our maps; nobody else should pay for it.
 if "gymnasium" in sys.modules:

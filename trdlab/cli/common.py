@@ -120,7 +120,7 @@ def publish(
         further: returns a command that shows more; it is told after the page.
     """
     if plot is not None:
-        from trdlab.show.plots.moment import check_picture
+        from trdlab.show.plots.style import check_picture
 
         check_picture(plot, overwrite=overwrite)
     thing = make()
@@ -131,9 +131,9 @@ def publish(
         if hint := further(thing):
             print_line(f"Try: {hint}", "dim")
     if plot is not None:
-        from trdlab.show.plots.moment import save_report
+        from trdlab.show.plots.style import save
 
-        save_report(thing, plot)
+        save(thing.plot(), plot)
         Console(stderr=True, highlight=False).print(
             f"Picture: {plot}", soft_wrap=True, markup=False
         )

@@ -73,9 +73,11 @@ def compare(
 
         out = free_name(Path("explanations"), f"{agents[0].name}-against-{agents[1].name}")
     if out is not None:
-        from trdlab.show.plots.comparison import picture_path
+        from trdlab.show.plots.comparison import NAME
+        from trdlab.show.plots.style import check_pictures
 
-        path = picture_path(out)
+        path = out / NAME
+        check_pictures([path])
     errors = Console(stderr=True, highlight=False)
     with EpisodeProgress(errors, "Getting ready") as progress:
         found = two.compare(
@@ -87,7 +89,7 @@ def compare(
         common.print_page(found, details=details)
     if out is not None:
         from trdlab.show.plots.comparison import comparison_figure
-        from trdlab.show.plots.pictures import write_picture
+        from trdlab.show.plots.style import save
 
-        write_picture(comparison_figure(found), path)
+        save(comparison_figure(found), path)
         errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

@@ -97,7 +97,7 @@ def explain(
 
         out = free_name(Path("explanations"), found.name)
     if out is not None:
-        from trdlab.show.plots.explained import picture_paths
+        from trdlab.show.plots.figures import picture_paths
 
         paths = picture_paths(out, parts, seed=seed, step=step)
     errors = Console(stderr=True, highlight=False)
@@ -118,7 +118,7 @@ def explain(
     else:
         common.print_page(explained, details=details)
     if out is not None:
-        from trdlab.show.plots.explained import write_pictures
+        from trdlab.show.plots.figures import write_pictures
 
         for path in write_pictures(explained, paths):
             errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

@@ -177,7 +177,7 @@ def runs(
     from trdlab.show.training import runs_table
 
     if plot is not None:
-        from trdlab.show.plots.moment import check_picture
+        from trdlab.show.plots.style import check_picture
 
         check_picture(plot, overwrite=overwrite)
     console, ascii_only = common.new_console()
@@ -187,9 +187,10 @@ def runs(
         return
     console.print(runs_table(found, ascii_only=ascii_only))
     if plot is not None:
-        from trdlab.show.plots.training import save_learning_curves
+        from trdlab.show.plots.style import save
+        from trdlab.show.plots.training import curves_figure
 
-        save_learning_curves([run.path for run in found if run.fault is None], plot)
+        save(curves_figure([run.path for run in found if run.fault is None]), plot)
         _say(_errors(), f"Picture: {plot}")
 
 

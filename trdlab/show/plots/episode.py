@@ -169,9 +169,9 @@ def _plot_rewards(ax: Axes, told: Story) -> None:
 def _mark_moments(ax: Axes, below: Axes, told: Story) -> None:
     """Numbers the moments; where some are near each other, their numbers stand together."""
     places = [place(claim) for claim in told.moments]
-    for place in set(places):
+    for step in set(places):
         for panel in (ax, below):
-            panel.axvline(place, color=style.INK, linewidth=0.7, linestyle=(0, (2, 2)), zorder=3)
+            panel.axvline(step, color=style.INK, linewidth=0.7, linestyle=(0, (2, 2)), zorder=3)
     for claim in told.moments:
         if "last" in claim.fields:
             rows = [claim.component] * 2

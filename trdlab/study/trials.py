@@ -74,9 +74,8 @@ def draw_trials(seed: int, count: int = 12) -> tuple[Trial, ...]:
             f"Give a multiple of {len(CANDIDATES)}, from {FEWEST} to {MOST}.",
         )
     rng = np.random.default_rng(seed)
-    return tuple(
-        _trial(letter, *draw(letter, rng)) for letter in rng.permutation([*LETTERS * each])
-    )
+    letters = rng.permutation([*LETTERS * each]).tolist()
+    return tuple(_trial(letter, *draw(letter, rng)) for letter in letters)
 
 
 def draw(letter: str, rng: np.random.Generator) -> tuple[Moment, dict[str, Way]]:
@@ -118,8 +117,9 @@ def _described(name: str, way: Way) -> str:
     rewards = [(k, event) for k, event in sorted(way.items()) if event.amount > 0.0]
     ((at, cost),) = [(k, event) for k, event in way.items() if event.amount < 0.0]
     pays = joined([f"{said(event.amount)} {when_of(TIME_AXIS, k)}" for k, event in rewards])
-    chances = [percent(event.chance) for event in (rewards[0][1], cost)]
+    sure = rewards[0][1].chance == 1.0
+    how = "for sure" if sure else f"each with a chance of {percent(rewards[0][1].chance)} %"
     return (
-        f"{name[0].upper()}{name[1:]} pays {pays}, each with a chance of {chances[0]} %. It costs "
-        f"{said(-cost.amount)} {when_of(TIME_AXIS, at)} with a chance of {chances[1]} %."
+        f"{name[0].upper()}{name[1:]} pays {pays}, {how}. It costs {said(-cost.amount)} "
+        f"{when_of(TIME_AXIS, at)} with a chance of {percent(cost.chance)} %."
     )

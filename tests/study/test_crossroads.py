@@ -17,7 +17,7 @@ from trdlab.study.crossroads import (
 )
 from trdlab.tabular import exact
 
-SEEDS = range(40)
+SEEDS = range(20)
 
 
 def drawn(letter: str, seed: int) -> tuple[np.ndarray, tuple[Way, ...]]:

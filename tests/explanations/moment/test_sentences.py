@@ -183,7 +183,7 @@ def read_back(choice: Choice) -> None:
     found = check(" ".join(claim.sentence for claim in claims), [(CHOICES, choice)])
     assert [claim.sentence for claim in found] == [claim.sentence for claim in claims]
     for claim in (*claims, *in_brief(choice)):
-        assert len(claim.sentence.split()) <= 32, claim.sentence  # slots may hold several words
+        assert len(claim.sentence.split()) <= 36, claim.sentence  # slots may hold several words
     assert len(in_brief(choice)) <= 5
 
 

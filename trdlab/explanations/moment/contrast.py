@@ -226,7 +226,7 @@ def more_immediate(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "{leader} costs less: {leader_cost:number} {last_step:within}, where {other} costs "
+    "{leader} costs less: {leader_cost:size} {last_step:within}, where {other} costs "
     "{other_cost:number}{averages:averages}."
 )
 def costs_less(choice: Choice) -> Iterator[Fields]:

@@ -15,10 +15,10 @@ __all__ = ["counted", "forms_of", "joined"]
 def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     """Returns the forms that a slot `{field:form}` of any sentence can take.
 
-    Numbers: `number` (2.71), `gives` and `pays` (gives 2.71, gives nothing, costs 0.5), `estimate`,
-    `size` (2.71, nothing), `percent`, `chance` (a 5 % chance), `given` (by the user: all its digits), `roots`, `tenths`, `count`, `steps`,
-    `episodes`, `times`, `states`. What is said where a flag asks for it: `average` and `averages`
-    (unless it is sure), `worth`, `net`, `ties`.
+    Numbers: `number` (2.71), `size` (2.71, nothing), `gives` and `pays` (gives 2.71, gives nothing,
+    costs 0.5), `estimate`, `percent`, `chance` (a 5 % chance), `given` (by the user: all its
+    digits), `roots`, `tenths`, `count`, `steps`, `episodes`, `times`, `states`. What is said where
+    a flag asks for it: `average` and `averages` (unless it is sure), `worth`, `net`, `ties`.
     Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `span`
     (from one to another), `within` (up to a step: in the first step, within 4 steps), `next` (the
     next 4 steps), `step`.

@@ -14,13 +14,7 @@ import numpy as np
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
 from trdlab.files import read_json
-<<<<<<< HEAD
-from trdlab.formatting import percent
-from trdlab.show.text import fit
-from trdlab.statistics import Estimate
-=======
 from trdlab.statistics import Estimate, bootstrap
->>>>>>> study
 from trdlab.study.candidates import LETTERS
 from trdlab.study.kit import GROUPS, SCHEMA, Group
 

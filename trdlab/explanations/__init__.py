@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from trdlab.explanations.moment.moment import Moment, Uncertainty, WhatIf, moment_of
     from trdlab.explanations.moment.sensitivity import find_flips
     from trdlab.explanations.moment.sentences import check, sentence, sentences
-    from trdlab.explanations.slots import UnsupportedSentenceError
+    from trdlab.explanations.rules import UnsupportedSentenceError
 
 __all__ = [
     "Calibration",

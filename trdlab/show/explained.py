@@ -43,9 +43,9 @@ def page(explained: Explained, *, ascii_only: bool = False) -> RenderableType:
     add(_setting(explained), "dim")
     add("")
     if not explained.parts:
-        for section in summary(explained):
-            add(section.heading, "bold")
-            for text in section.sentences:
+        for part in summary(explained):
+            add(part.heading, "bold")
+            for text in part.sentences:
                 add(text, indent=2)
         return Group(*lines)
     explanation = explained.explanation
@@ -129,7 +129,10 @@ def check_explained(text: str, explained: Explained) -> list[Any]:
     Raises:
         UnsupportedSentenceError: a sentence is none that trdlab writes, or is not true.
     """
-    rules = [(REPORTS, explained.report), (outcome.TRIALS, explained.trial)]
+    rules: list[tuple[Any, Any]] = [
+        (REPORTS, explained.report),
+        (outcome.TRIALS, explained.trial),
+    ]
     subjects: tuple[tuple[Language[Any], Any], ...] = (
         (MOMENTS, explained.explanation),
         (STORIES, None if explained.story is None else explained.story.played),
@@ -137,7 +140,7 @@ def check_explained(text: str, explained: Explained) -> list[Any]:
     known = [(language, subject) for language, subject in subjects if subject is not None]
 
     def true(piece: str) -> Any:
-        found = (rule.true(piece, of) for rule, of in rules if of is not None)  # type: ignore[arg-type]
+        found = (rule.true(piece, of) for rule, of in rules if of is not None)
         return next((claim for claim in found if claim is not None), None)
 
     return [true(piece) or checked(piece, known) for piece in split(text)]

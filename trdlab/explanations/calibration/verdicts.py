@@ -101,7 +101,13 @@ def _kind(told: Calibration, i: int) -> Kind:
     if told.status[i] == "not tested":
         return "silent" if told.constant[i] else "unseen"
     if told.constant[i]:
-        return {"good": "right", "bad": "wrong", "open": "unsure"}[told.status[i]]
+        return (
+            "right"
+            if told.status[i] == "good"
+            else "wrong"
+            if told.status[i] == "bad"
+            else "unsure"
+        )
     if told.status[i] == "open":
         return "too-few" if told.num_episodes[i] < FEWEST_EPISODES else "unsure"
     return "better" if told.status[i] == "good" else "no-better"

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from trdlab.explanations.rules import Claim, Fields, Form, Language, every, first, plain_data
+from trdlab.explanations.rules import Claim, Fields, Form, Language, every, plain_data
 from trdlab.explanations.sections import Section
 from trdlab.explanations.words import forms_of
 from trdlab.rollouts.counterfactual import Counterfactual
@@ -39,6 +39,11 @@ class Trial:
     def foil(self) -> str:
         """The name of the other."""
         return self.action_names[self.found.foil]
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether something is known of what came."""
+        return not np.isnan(self.found.observed.value[-1])
 
     def gaps(self) -> Iterator[Fields]:
         """Yields each difference that was forecast, and what came: at components, then in all.
@@ -96,29 +101,13 @@ rule = TRIALS.rule
 
 # ---- how often -----------------------------------------------------------------------------------
 
-_TRIED = "{action} and {foil} were each tried {copies:times} from here"
 
-
-def _who(trial: Trial) -> Fields:
-    return {"action": trial.action, "foil": trial.foil, "copies": trial.found.copies}
-
-
-@rule(f"{_TRIED}, but cut off before anything could come.")
-def not_seen(trial: Trial) -> Iterator[Fields]:
-    if np.isnan(trial.found.observed.value[-1]):
-        yield _who(trial)
-
-
-@rule(f"{_TRIED}, and each brought the same every time.")
-def always_the_same(trial: Trial) -> Iterator[Fields]:
-    if trial.found.same_every_time:
-        yield _who(trial)
-
-
-@rule(f"{_TRIED}.")
-def tried_often(trial: Trial) -> Iterator[Fields]:
-    if not trial.found.same_every_time:
-        yield _who(trial)
+@rule("{action} and {foil} were each tried {copies:times} from here{how:text}.")
+def tried(trial: Trial) -> Iterator[Fields]:
+    how = ", and each brought the same every time" if trial.found.same_every_time else ""
+    if not trial.is_seen:
+        how = ", but cut off before anything could come"
+    yield {"action": trial.action, "foil": trial.foil, "copies": trial.found.copies, "how": how}
 
 
 # ---- whether what was forecast came --------------------------------------------------------------
@@ -173,8 +162,8 @@ def against_the_forecast(trial: Trial) -> Iterator[Fields]:
 
 
 @rule(
-    "Against the forecast, {more} {component:paid} no more than {less}{component:at}; {said:number} "
-    "more was forecast."
+    "Against the forecast, {more} {component:paid} no more than {less}{component:at}; "
+    "{said:number} more was forecast."
 )
 def no_difference(trial: Trial) -> Iterator[Fields]:
     for gap in trial.gaps():
@@ -236,12 +225,12 @@ def in_brief(trial: Trial) -> list[Claim]:
 def _told(trial: Trial) -> tuple[Claim, ...]:
     order, furthest = _outcomes(trial), _furthest(trial)
     told = [claim for claim in order if claim.component is None or claim.component in furthest]
-    return (*told, *first(trial, not_seen, always_the_same, tried_often))
+    return (*told, *tried(trial))
 
 
 def _outcomes(trial: Trial) -> list[Claim]:
     """Returns what came in all, and then of each component."""
-    if np.isnan(trial.found.observed.value[-1]):
+    if not trial.is_seen:
         return []
     found = every(trial, *_OUTCOMES)
     return sorted(found, key=lambda claim: -1 if claim.component is None else claim.component)

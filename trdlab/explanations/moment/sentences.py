@@ -16,7 +16,8 @@ from trdlab.explanations.moment import (
     worth,
 )
 from trdlab.explanations.moment.explanation import Explanation
-from trdlab.explanations.slots import Form, Language, UnsupportedSentenceError, forms_of
+from trdlab.explanations.rules import UnsupportedSentenceError
+from trdlab.explanations.slots import Form, Language, forms_of
 from trdlab.formatting import decimals_for
 
 __all__ = ["TEMPLATES", "UnsupportedSentenceError", "check", "sentence", "sentences"]

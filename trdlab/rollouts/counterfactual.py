@@ -88,23 +88,17 @@ def counterfactual(
         branching.at(environments, stack, first, age=age, seed=own)
         for first, own in zip((action, foil), seeds, strict=True)
     ]
-    return compared(tried, (action, foil), seen, seed=seed)
+    return _compared(tried, (action, foil), seen, seed)
 
 
-def compared(
-    tried: Sequence[Branches], actions: tuple[int, int], seen: Seen | None = None, *, seed: int = 0
+def _compared(
+    tried: Sequence[Branches], actions: tuple[int, int], seen: Seen | None, seed: int
 ) -> Counterfactual:
     """Returns how two actions differ that were tried.
 
     Nothing can come that is less, or more, than what was ever seen or is predicted. Where all
     copies of each brought the same, and not always nothing, there is no chance, unless copies went
     differently elsewhere.
-
-    Args:
-        tried: what followed the one and the other.
-        actions: their numbers.
-        seen: what is known from elsewhere of the rewards that can come.
-        seed: of the intervals.
     """
     whole = all(bool(branches.known[0, -1]) for branches in tried)
     one, other = (_futures(branches, whole) for branches in tried)  # [n, N+2]

@@ -184,7 +184,8 @@ def _could_be_missed(
     """
     discounts = np.maximum(axis.discounts, np.finfo(np.float64).tiny)
     largest = np.abs(np.stack(ranges)[..., :-1] / discounts).max()
-    return np.asarray([unseen(int(count)) for count in num_episodes]) * largest * discounts
+    missed = np.array([unseen(count) for count in num_episodes.tolist()])
+    return np.asarray(missed * largest * discounts)
 
 
 def _sums(samples: Samples) -> tuple[FloatArray, BoolArray]:

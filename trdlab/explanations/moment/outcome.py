@@ -62,17 +62,9 @@ class Trial:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the numbers and the claims as plain data at full precision."""
-        found = self.found
-        return {
-            "action": self.action,
-            "foil": self.foil,
-            "copies": found.copies,
-            "whole": found.whole,
-            "same_every_time": found.same_every_time,
-            "predicted": plain_data(found.predicted),
-            "observed": plain_data(found.observed),
-            "findings": [claim.to_dict() for claim in _told(self)],
-        }
+        names = {"action": self.action, "foil": self.foil}
+        told = {"findings": [claim.to_dict() for claim in _told(self)]}
+        return {**plain_data(self.found), **names, **told}
 
 
 def _forms(trial: Trial) -> dict[str, Form]:

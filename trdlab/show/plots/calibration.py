@@ -20,6 +20,7 @@ _LOWEST = -0.5  # skill below this is an arrow at the edge; the lowest with its 
 _GROUNDS = {style.TRUSTED: "better than a guess", style.WRONG: "no better", style.OPEN: "open"}
 
 
+@style.settings()
 def trust_figure(report: TrustReport, title: str = "") -> Figure:
     """Returns the skill of every component, and how far a forecast can be trusted.
 

@@ -31,6 +31,7 @@ PANEL = 1.75
 EXPECTED = "expected discounted reward"
 
 
+@style.settings()
 def moment_figure(
     moment: Moment,
     action: str,

@@ -7,8 +7,8 @@ their text can be read on a phone; they need no pyplot, and no backend of the us
 """
 
 import io
-from collections.abc import Collection, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from textwrap import fill
@@ -87,19 +87,20 @@ class Picture(Figure):
         return file.getvalue()
 
 
-def settings() -> AbstractContextManager[None]:
-    """Returns a context in which matplotlib draws as it does for everybody."""
-    return mpl.rc_context(_SETTINGS)
+@contextmanager
+def settings() -> Iterator[None]:
+    """Lets matplotlib draw in the style of trdlab, whatever the user's settings say."""
+    with mpl.rc_context(_SETTINGS):
+        yield
 
 
 def new_figure(height: float, title: str = "") -> Picture:
     """Returns an empty picture of a height in inches; what is drawn in it is laid out by itself."""
-    with settings():
-        figure = Picture(figsize=(WIDTH, height), layout="constrained")
-        FigureCanvasAgg(figure)
-        if title:
-            lines = -(-len(title) // 62)
-            figure.suptitle(fill(title, len(title) // lines + 6), fontsize=TITLE)
+    figure = Picture(figsize=(WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    if title:
+        lines = -(-len(title) // 62)
+        figure.suptitle(fill(title, len(title) // lines + 6), fontsize=TITLE)
     return figure
 
 

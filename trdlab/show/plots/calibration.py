@@ -34,7 +34,7 @@ def trust_figure(report: TrustReport, title: str = "") -> Figure:
     if found is not None:
         plot_reliability(panels[1], found)
     note = f"{axis_title(report.time_axis)} · {report.num_episodes} episodes"
-    style.add_legend(figure, _handles(report), note)
+    style.add_legend(figure, trust_handles(report), note)
     return figure
 
 
@@ -56,14 +56,16 @@ def plot_trust(ax: Axes, report: TrustReport) -> Axes:
     _draw_skill(ax, x, found.skill, style.EXPECTED, marker="o", markersize=3.5)
     below = np.flatnonzero(found.skill.value < _LOWEST)
     if below.size:
-        ax.plot(x[below], 0.0 * below + _LOWEST, "v", color=style.EXPECTED, clip_on=False)
+        ax.plot(x[below], 0.0 * below + _LOWEST, "v", color=style.EXPECTED)
         worst = below[found.skill.value[below].argmin()]
         text = f"down to {style.told(float(found.skill.value[worst]), 1)}"
-        style.note(ax, text, (x[worst], _LOWEST), (-6, 4), ha="right", gid=bars.CUT)
+        how = {"ha": "left" if worst < len(x) / 2 else "right", "va": "top", "gid": bars.CUT}
+        style.note(ax, text, (x[worst], _LOWEST), (0, -5), **how)
     for marker, where in zip("ox", _untested(report), strict=True):
         ax.plot(x[where], 0.0 * x[where], marker, color=style.MUTED, mfc="white", markersize=5)
     style.label_steps(ax, report.time_axis, x)
-    ax.set(ylim=(_LOWEST, 1.1), yticks=(-0.5, 0.0, 0.5, 1.0), xlabel="steps ahead")
+    floor = _LOWEST - 0.25 * bool(below.size)
+    ax.set(ylim=(floor, 1.1), yticks=(-0.5, 0.0, 0.5, 1.0), xlabel="steps ahead")
     ax.set_ylabel("skill (1: perfect,\n0: a constant guess)")
     last = report.trust.last_step
     text = "not trusted" if last is None else f"trusted to {step_label(last)}"
@@ -94,8 +96,8 @@ def plot_reliability(ax: Axes, found: Reliability) -> Axes:
     return style.tidy(ax)
 
 
-def _handles(report: TrustReport) -> list[Artist]:
-    """Returns what the legend explains: only what is there."""
+def trust_handles(report: TrustReport) -> list[Artist]:
+    """Returns what a legend explains of `plot_trust`: only what is there."""
     muted: Any = {"colour": style.MUTED}
     handles: list[Artist] = [bars.handle("this forecast", "-", "o", style.EXPECTED, style.EXPECTED)]
     if report.ceiling is not None:

@@ -100,15 +100,8 @@ def plot_action(
     What is not to be trusted is pale. Where the episode may end meanwhile, a dotted line is the
     chance that it is still running, with a scale of its own on the right.
 
-    Args:
-        ax: the axes to draw on.
-        moment: the decompositions, and their uncertainty or error.
-        action: the name of the action.
-        scale: what the axes show; by default all bars of this action.
-        possible: the values that a component can have; whiskers end there.
-
-    Returns:
-        `ax`.
+    It is drawn on `ax`, which is returned; see `plot_moment`. Without a `scale` the axes show all
+    bars of this action.
     """
     components, ends = moment.components(action), _ends(moment, action, possible)
     scale = scale_of(components[None], ends) if scale is None else scale
@@ -128,15 +121,8 @@ def plot_contrast(
 ) -> Axes:
     """Draws action minus foil: up, and in the colour of the action, where that pays more.
 
-    Args:
-        ax: the axes to draw on.
-        moment: the decompositions.
-        action: the name of an action.
-        foil: the name of another.
-        trial: of both; what came of their difference is drawn as diamonds.
-
-    Returns:
-        `ax`.
+    Diamonds are what came of their difference in a trial of both. It is drawn on `ax`, which is
+    returned.
     """
     delta, axis = settled(difference(moment, action, foil)), moment.time_axis
     came = None if trial is None else _came(trial)

@@ -60,12 +60,7 @@ PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 _DPI = 200
 _GAP = 0.6  # between the explicit components and the residual, in bars
 _MOST_LETTERS = 40  # beneath one axis
-_LOOKS = (  # the user's settings of these would change a picture
-    *("axes", "figure", "font", "hatch", "image", "legend", "lines", "patch", "path", "savefig"),
-    *("scatter", "svg", "text", "xaxis", "xtick", "yaxis", "ytick"),
-)
-_SETTINGS = {
-    **{key: value for key, value in mpl.rcParamsDefault.items() if key.split(".")[0] in _LOOKS},
+_SETTINGS: Any = {
     "font.size": TEXT,
     "text.color": INK,
     "axes.edgecolor": MUTED,
@@ -90,7 +85,9 @@ class Picture(Figure):
 @contextmanager
 def settings() -> Iterator[None]:
     """Lets matplotlib draw in the style of trdlab, whatever the user's settings say."""
-    with mpl.rc_context(_SETTINGS):
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_SETTINGS)
         yield
 
 

@@ -1,4 +1,8 @@
-"""trdlab: when does an agent expect which reward, and how far can that be trusted?"""
+"""trdlab: when does an agent expect which reward, and how far can that be trusted?
+
+The verbs: `solve` a model, `train` a network, or name an `agent`; then `calibrate`, `explain` and
+`compare` it. The nouns: `Agent`, `Estimator`, `Future`, `RewardDecomposition`, `TimeAxis`.
+"""
 
 import os
 import sys
@@ -7,20 +11,46 @@ from typing import TYPE_CHECKING
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
+    from trdlab.agents.agent import Agent
     from trdlab.decomposition import RewardDecomposition
     from trdlab.estimator import Estimator, Future
+    from trdlab.policies.protocol import Policy
     from trdlab.time_axis import TimeAxis
     from trdlab.training.loading import load
+    from trdlab.verbs import agent, calibrate, compare, explain, solve, train
 
 __version__ = "0.1.0"
-__all__ = ["Estimator", "Future", "RewardDecomposition", "TimeAxis", "__version__", "load"]
+__all__ = [
+    "Agent",
+    "Estimator",
+    "Future",
+    "Policy",
+    "RewardDecomposition",
+    "TimeAxis",
+    "__version__",
+    "agent",
+    "calibrate",
+    "compare",
+    "explain",
+    "load",
+    "solve",
+    "train",
+]
 
 _HOMES = {
+    "Agent": "agents.agent",
     "RewardDecomposition": "decomposition",
     "TimeAxis": "time_axis",
     "Estimator": "estimator",
     "Future": "estimator",
+    "Policy": "policies.protocol",
     "load": "training.loading",
+    "agent": "verbs",
+    "calibrate": "verbs",
+    "compare": "verbs",
+    "explain": "verbs",
+    "solve": "verbs",
+    "train": "verbs",
 }
 
 __getattr__ = lazily(__name__, _HOMES)

@@ -1,20 +1,26 @@
 """An explained agent, as text, as plain data, and drawn."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-
-from trdlab.agents import gridworld_agent
-from trdlab.decomposition import TimeAxis
-from trdlab.errors import InputError
-from trdlab.explanations import assess, explain_agent
 from trdlab.explanations.explained import Explained, Part, parse_parts
 from trdlab.explanations.moment.sentences import UnsupportedSentenceError
 from trdlab.show.explained import check_explained, summary, to_dict
-from trdlab.show.plots.calibration import trust_figure
-from trdlab.show.plots.figures import part_figure, picture_paths
+
+from trdlab.agents import gridworld_agent
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.errors import InputError
+from trdlab.estimator import Future
+from trdlab.explanations import Moment, assess, explain, explain_agent
+from trdlab.show.plots.explained import (
+    moment_figure,
+    part_figure,
+    picture_paths,
+    trust_figure,
+)
 
 
 @cache
@@ -83,14 +89,47 @@ def test_what_was_not_asked_for_is_null():
     assert to_dict(explained(parts=("calibration",)))["moment"] is None
 
 
+def test_bars_that_are_not_to_be_trusted_are_faded():
+    found = explained("ledge")
+    explanation, report = found.explanation, found.report
+    assert explanation is not None
+    assert report is not None
+    trust = replace(report.trust, components=2, tested=2, residual=True)
+    of_foils = replace(report.trust, components=3, tested=3, residual=False)
+    moment = replace(explanation.moment, trust=trust, foil_trust=of_foils)
+    figure = moment_figure(replace(explanation, moment=moment), explanation.foil, "ledge")
+    figure.canvas.draw()
+    faded = [
+        [bar.get_alpha() is not None for bar in ax.patches] for ax in figure.axes if ax.patches
+    ]
+    assert faded[0] == [False, False, True, True, False]
+    assert faded[1] == [False, False, False, True, True]
+    assert faded[2] == [False, False, True, True, True], "a difference needs both"
+    assert "faded" in figure.texts[-1].get_text()
+
+
+def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
+    rows = np.array([[1.0, 0.9, 94.5], [1.0, -0.8, 2.0]])
+    axis = TimeAxis(0.95, 2)
+    moment = Moment(RewardDecomposition(rows, axis), ("left", "right"), Future("a policy"))
+    figure = moment_figure(explain(moment, "left", "right"), "right", "")
+    action, foil, contrast = figure.axes
+    assert action.get_ylim() == foil.get_ylim() == (-1.5, 1.5)
+    notes = [[text.get_text() for text in ax.texts] for ax in figure.axes]
+    assert notes[0][-1] == "↑ 94.5"
+    assert notes[1][-1] == "↑ 2"
+    assert notes[2][-1] == "↑ 92.5"
+    assert contrast.get_ylim()[1] < 3.0
+
+
 def test_how_often_a_reward_came_is_drawn_where_there_is_one_amount():
     several = explained("ledge").report  # -1 and 1
     assert several is not None
     assert len(trust_figure(several, "ledge").axes) == 1
-    coin = assess(gridworld_agent("loop,slip=0.2", TimeAxis(0.95, 4)), episodes=40)
+    coin = assess(gridworld_agent("loop,slip=0.2", TimeAxis(0.95, 4)), episodes=120)
     skill, chance = trust_figure(coin, "loop").axes
     assert skill.get_ylabel().startswith("skill")
-    assert chance.get_title() == "the reward of 1"
+    assert chance.get_title() == "chance of the reward of 1"
     drawn = np.asarray(chance.collections[-1].get_offsets())
     found = coin.calibration.reliability
     assert found is not None

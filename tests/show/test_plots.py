@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
@@ -25,18 +26,19 @@ from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, OutputError
 from trdlab.estimator import Future
-from trdlab.explanations import explain_agent
-from trdlab.explanations.explained import Explained
+from trdlab.explanations import Explanation, explain, solve_gridworld, solve_tabular
+from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.moment.exact import tabular_moment
 from trdlab.explanations.moment.moment import Moment, Uncertainty
+from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld, load_map, parse_map
+from trdlab.policies import Memoryless
 from trdlab.rollouts.episodes import collect
-from trdlab.show import gridworld, tabular
 from trdlab.show.plots import figure as figure_of
 from trdlab.show.plots import style
 from trdlab.show.plots.bars import CUT, plot_components
-from trdlab.show.plots.figures import explained_figure
-from trdlab.show.plots.map import plot_map, report_figure, route_taken
+from trdlab.show.plots.figures import explanation_figure
+from trdlab.show.plots.map import plot_map, route_taken, solved_figure
 from trdlab.show.plots.moment import (
     moment_figure,
     plot_action,
@@ -45,7 +47,6 @@ from trdlab.show.plots.moment import (
     without_noise,
 )
 from trdlab.show.plots.style import action_colours
-from trdlab.show.report import Report
 from trdlab.tabular import exact
 
 AXIS = TimeAxis(0.9, 3)
@@ -66,17 +67,15 @@ LEARNED = moment([[0.1, 0.5, 0.2, 0.0], [0.3, 0.4, 0.2, 0.1]])
 
 
 @cache
-def reports() -> dict[str, Report]:
-    how = {"gamma": 0.95, "horizon": 4}
-    found: dict[str, Report] = {
-        name: gridworld.report(name, **how) for name in ("drone", "bridge", "ledge", "windy")
-    }
-    return found | {"FrozenLake": tabular.report("FrozenLake-v1", (), **how)}
+def solved() -> dict[str, SolvedState]:
+    axis = TimeAxis(0.95, 4)
+    found = {name: solve_gridworld(name, axis) for name in ("drone", "bridge", "ledge", "windy")}
+    return found | {"FrozenLake": solve_tabular("FrozenLake-v1", axis)}
 
 
 @cache
-def explained() -> Explained:
-    return explain_agent(gridworld_agent("ledge", TimeAxis(0.95, 4)), episodes=60)
+def explained() -> Explanation:
+    return explain(gridworld_agent("ledge", TimeAxis(0.95, 4)), episodes=60)
 
 
 def whisker_ends(ax: Axes) -> list[tuple[float, float]]:
@@ -88,8 +87,12 @@ def cut_texts(ax: Axes) -> list[str]:
     return [text.get_text() for text in ax.texts if text.get_gid() == CUT]
 
 
+def bars(ax: Axes) -> list[Rectangle]:
+    return list(ax.containers[0].patches)
+
+
 def heights(ax: Axes) -> list[float]:
-    return [bar.get_height() for bar in ax.patches]
+    return [bar.get_height() for bar in bars(ax)]
 
 
 def assert_inside(ax: Axes) -> None:
@@ -125,9 +128,9 @@ def test_whiskers_of_an_exact_table_are_standard_deviations():
 def test_whiskers_end_where_no_reward_can_be():
     ax = plot_action(Figure().subplots(), replace(LEARNED, only_reward=1.0), "go")
     np.testing.assert_allclose(whisker_ends(ax), [(0.0, 0.3), (0.2, 0.8)])
-    lake = report_figure(reports()["FrozenLake"])
+    lake = solved_figure(solved()["FrozenLake"])
     assert min(low for ax in lake.axes for low, _ in whisker_ends(ax)) == 0.0
-    ledge = report_figure(reports()["ledge"])  # where there are costs
+    ledge = solved_figure(solved()["ledge"])  # where there are costs
     assert min(low for ax in ledge.axes for low, _ in whisker_ends(ax)) < 0.0
 
 
@@ -154,8 +157,8 @@ def test_a_residual_is_shown_whole_where_the_rest_is_next_to_nothing():
 
 
 def test_what_is_only_there_by_rounding_is_zero_and_has_no_scale():
-    windy = reports()["windy"]
-    *_, contrast = report_figure(windy).axes
+    same = solve_gridworld("windy", TimeAxis(0.95, 4), action="down", foil="right")
+    *_, contrast = solved_figure(same).axes
     assert heights(contrast) == [0.0] * 5
     assert contrast.get_yticks().tolist() == [0.0]
     ax = plot_components(Figure().subplots(), np.array([1.0, 1e-17, 0.0, 0.5]), AXIS)
@@ -207,9 +210,9 @@ def test_an_action_has_one_colour_whatever_part_it_plays():
     }
     for action, foil in (("go", "stay"), ("stay", "go")):
         first, second, contrast = moment_figure(LEARNED, action, foil).axes
-        assert {to_hex(bar.get_edgecolor()) for bar in first.patches} == {colours[action]}
-        assert {to_hex(bar.get_edgecolor()) for bar in second.patches} == {colours[foil]}
-        pairs = zip(contrast.patches, heights(contrast), strict=True)
+        assert {to_hex(bar.get_edgecolor()) for bar in bars(first)} == {colours[action]}
+        assert {to_hex(bar.get_edgecolor()) for bar in bars(second)} == {colours[foil]}
+        pairs = zip(bars(contrast), heights(contrast), strict=True)
         assert all(
             to_hex(bar.get_edgecolor()) == colours[action if height > 0.0 else foil]
             for bar, height in pairs
@@ -219,7 +222,7 @@ def test_an_action_has_one_colour_whatever_part_it_plays():
 
 def test_a_route_has_the_colour_of_its_action_and_directions_the_same_in_every_world():
     colours = action_colours(("up", "down", "left", "right"))
-    table = reports()["drone"].table
+    table = solved()["drone"].table
     world = Gridworld(load_map("drone"))
     for action, foil in (("up", "down"), ("down", "up")):
         ax = plot_map(Figure().subplots(), world, table, 0, action, foil)
@@ -231,20 +234,19 @@ def test_a_route_has_the_colour_of_its_action_and_directions_the_same_in_every_w
     assert len(set(taxi.values())) == 6
 
 
-def test_bars_that_are_not_to_be_trusted_are_pale():
-    found = explained()
-    explanation, report = found.explanation, found.report
-    assert explanation is not None
-    assert report is not None
-    trust = replace(report.trust, components=2, residual=True)
-    of_foils = replace(report.trust, components=3, residual=False)
-    judged = replace(explanation.moment, trust=trust, foil_trust=of_foils)
-    figure = moment_figure(judged, explanation.action, explanation.foil)
-    pale = [[bar.get_alpha() is not None for bar in ax.patches] for ax in figure.axes if ax.patches]
-    assert pale[0] == [False, False, True, True, False]
-    assert pale[1] == [False, False, False, True, True]
-    assert pale[2] == [False, False, True, True, True], "a difference needs both"
-    assert any("pale" in text.get_text() for text in figure.legends[0].get_texts())
+def test_what_is_bad_and_what_is_not_tested_stand_on_different_ground():
+    trust = Trust(AXIS, ("good", "bad", "open", "good"))
+    of_foils = Trust(AXIS, ("good", "good", "good", "not tested"))
+    judged = replace(LEARNED, trust=trust, foil_trust=of_foils, policy=np.array([1.0, 0.0]))
+    figure = moment_figure(judged, "go", "stay")
+    grounds = [
+        [to_hex(patch.get_facecolor()) for patch in ax.patches if patch not in bars(ax)]
+        for ax in figure.axes
+    ]
+    bad, grey = style.EVIDENCE["bad"], style.EVIDENCE["not tested"]
+    assert grounds == [[bad, grey], [grey], [bad, grey, grey]]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"no better than a guess", "open, or not tested"} <= set(labels)
 
 
 # ---- the page ------------------------------------------------------------------------------------
@@ -253,8 +255,8 @@ def test_bars_that_are_not_to_be_trusted_are_pale():
 @cache
 def figures() -> list[Figure]:
     found = explained()
-    parts = [explained_figure(found, part) for part in ("contrast", "episode", "calibration")]
-    return [*map(report_figure, reports().values()), *parts]
+    parts = [explanation_figure(found, part) for part in ("contrast", "episode", "calibration")]
+    return [*map(solved_figure, solved().values()), *parts]
 
 
 def texts(figure: Figure) -> list[Text]:
@@ -303,8 +305,8 @@ def test_the_line_of_those_still_running_is_explained():
 
 
 def test_a_route_stops_before_the_treasure_that_it_leads_to():
-    bridge = reports()["bridge"]
-    assert isinstance(bridge, gridworld.GridworldReport)
+    bridge = solved()["bridge"]
+    assert isinstance(bridge.world, Gridworld)
     ax = plot_map(Figure().subplots(), bridge.world, bridge.table, 0, "down", "left")
     for line in ax.lines:
         x, y = (values[-1] for values in line.get_data())
@@ -324,7 +326,10 @@ def test_the_way_that_an_episode_took_is_found_in_what_it_expected():
             return table.decompose(observations)
 
     (episode,) = collect(
-        Watched(), agent.make(1, 3), policy=lambda states: table.solution.policy[states], seed=3
+        Watched(),
+        agent.make(1, 3),
+        policy=Memoryless(lambda states: table.solution.policy[states]),
+        seed=3,
     )
     assert route_taken(table, episode) == seen
     assert len(seen) > 5
@@ -351,11 +356,11 @@ def test_pictures_need_no_pyplot_and_no_backend_of_the_users(tmp_path: Path):
 
 
 def test_the_users_settings_stay_theirs_and_change_no_picture():
-    drone = reports()["drone"]
-    before = report_figure(drone)._repr_png_()
+    drone = solved()["drone"]
+    before = solved_figure(drone)._repr_png_()
     with mpl.rc_context({"axes.facecolor": "black", "font.size": 30.0, "axes.grid": True}):
         mine = dict(mpl.rcParams)
-        assert report_figure(drone)._repr_png_() == before
+        assert solved_figure(drone)._repr_png_() == before
         assert dict(mpl.rcParams) == mine
 
 
@@ -372,14 +377,14 @@ def test_a_picture_is_written_whole_or_not_at_all(tmp_path: Path):
 
 def test_there_is_a_picture_of_every_noun_and_of_nothing_else():
     found = explained()
-    assert found.explanation is not None
+    assert found.choice is not None
     for thing in (
         found,
-        found.explanation,
-        found.explanation.moment,
+        found.choice,
+        found.choice.moment,
         found.story,
-        reports()["drone"],
-        reports()["drone"].table,
+        solved()["drone"],
+        solved()["drone"].table,
         Gridworld(load_map("loop")),
     ):
         assert figure_of(thing).get_figwidth() == style.WIDTH

@@ -6,22 +6,19 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration.reliability import Reliability
-from trdlab.explanations.calibration.report import TrustReport
-from trdlab.explanations.calibration.trust import is_wrong, trusted
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.formatting import amount
 from trdlab.show.plots import bars, style
 from trdlab.time_axis import axis_title, step_label
 
 _LOWEST = -0.5  # skill below this is an arrow at the edge; the lowest with its number
-_GROUNDS = {style.TRUSTED: "better than a guess", style.WRONG: "no better", style.OPEN: "open"}
 
 
 @style.settings()
-def trust_figure(report: TrustReport, title: str = "") -> Figure:
+def trust_figure(report: CalibrationReport, title: str = "") -> Figure:
     """Returns the skill of every component, and how far a forecast can be trusted.
 
     Where rewards are either 0 or one amount, how often it came stands below it.
@@ -33,12 +30,12 @@ def trust_figure(report: TrustReport, title: str = "") -> Figure:
     plot_trust(panels[0], report)
     if found is not None:
         plot_reliability(panels[1], found)
-    note = f"{axis_title(report.time_axis)} · {report.num_episodes} episodes"
+    note = f"{axis_title(report.time_axis)} · {report.judged.episodes} episodes"
     style.add_legend(figure, trust_handles(report), note)
     return figure
 
 
-def plot_trust(ax: Axes, report: TrustReport) -> Axes:
+def plot_trust(ax: Axes, report: CalibrationReport) -> Axes:
     """Draws the skill of every component with its interval on `ax`, which is returned.
 
     The ground of a component is green where it has proved better than a constant guess, red where
@@ -48,8 +45,7 @@ def plot_trust(ax: Axes, report: TrustReport) -> Axes:
     known.
     """
     found, x = report.calibration, style.positions(report.time_axis, 1.0)
-    for place, colour in zip(x, _grounds(report), strict=True):
-        ax.axvspan(place - 0.5, place + 0.5, color=colour, linewidth=0, zorder=0)
+    style.draw_grounds(ax, x, found.status)
     ax.axhline(0.0, color=style.MUTED, linewidth=0.8)
     if report.ceiling is not None:
         _draw_skill(ax, x, report.ceiling.skill, style.MUTED, linestyle="--")
@@ -96,31 +92,24 @@ def plot_reliability(ax: Axes, found: Reliability) -> Axes:
     return style.tidy(ax)
 
 
-def trust_handles(report: TrustReport) -> list[Artist]:
+def trust_handles(report: CalibrationReport) -> list[Artist]:
     """Returns what a legend explains of `plot_trust`: only what is there."""
     muted: Any = {"colour": style.MUTED}
     handles: list[Artist] = [bars.handle("this forecast", "-", "o", style.EXPECTED, style.EXPECTED)]
     if report.ceiling is not None:
         handles.append(bars.handle("a perfect forecast", "--", **muted))
-    grounds = _grounds(report)
-    handles += [Patch(color=c, label=text) for c, text in _GROUNDS.items() if c in grounds]
+    handles += style.ground_handles(report.calibration.status)
     constant, unknown = _untested(report)
     handles += [bars.handle("nothing to predict", "", "o", **muted)] * bool(constant.any())
     handles += [bars.handle("not tested", "", "x", **muted)] * bool(unknown.any())
     return handles
 
 
-def _untested(report: TrustReport) -> tuple[Any, Any]:
-    """Returns two of `[N+1]`: where there was nothing to predict, and where nothing is known."""
-    constant = report.calibration.is_("nothing to predict")
-    return constant, ~constant & ~report.calibration.is_("judged")
-
-
-def _grounds(report: TrustReport) -> Any:
-    """Returns `[N+1]`: the colour of the evidence of each component."""
+def _untested(report: CalibrationReport) -> tuple[Any, Any]:
+    """Returns two of `[N+1]`: where there was nothing to predict, and where nothing was tested."""
     found = report.calibration
-    wrong = is_wrong(found) & found.is_("nothing to predict") | (found.skill.high <= 0.0)
-    return np.select([trusted(found), wrong], [style.TRUSTED, style.WRONG], style.OPEN)
+    untested = found.is_("not tested")
+    return found.constant & ~untested, untested
 
 
 def _draw_skill(ax: Axes, x: FloatArray, skill: Any, colour: str, **how: Any) -> None:

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from trdlab.explanations.comparison.report import SIDES, Comparison
+from trdlab.explanations.comparison.comparison import SIDES, Comparison
 from trdlab.formatting import decimals_between
 from trdlab.show.plots import bars, style
 from trdlab.show.plots.bars import scale_of, settled

@@ -14,8 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.episode.played import Played
-from trdlab.explanations.episode.promises import Broken
-from trdlab.explanations.episode.story import Story
+from trdlab.explanations.episode.story import Story, place
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.render import draw_map
 from trdlab.show.plots import style
@@ -170,12 +169,12 @@ def _plot_rewards(ax: Axes, told: Story) -> None:
 
 def _mark_moments(ax: Axes, below: Axes, told: Story) -> None:
     """Numbers the moments; where some are near each other, their numbers stand together."""
-    places = [claim.place or 0 for claim in told.moments]
-    for place in set(places):
+    places = [place(claim) for claim in told.moments]
+    for step in set(places):
         for panel in (ax, below):
-            panel.axvline(place, color=style.INK, linewidth=0.7, linestyle=(0, (2, 2)), zorder=3)
+            panel.axvline(step, color=style.INK, linewidth=0.7, linestyle=(0, (2, 2)), zorder=3)
     for claim in told.moments:
-        if isinstance(claim, Broken):
+        if "last" in claim.fields:
             rows = [claim.component] * 2
             for colour, width in (("white", 3.5), (style.INK, 1.5)):
                 ax.plot([claim.first, claim.last], rows, color=colour, linewidth=width, zorder=4)

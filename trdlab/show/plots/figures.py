@@ -7,22 +7,20 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from trdlab.errors import InputError
-from trdlab.explanations.calibration.report import TrustReport
-from trdlab.explanations.comparison.report import Comparison
+from trdlab.explanations.calibration.report import CalibrationReport
+from trdlab.explanations.comparison.comparison import Comparison
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import Story, tell
-from trdlab.explanations.explained import PARTS, Explained, Part
-from trdlab.explanations.moment.explanation import Explanation
-from trdlab.explanations.moment.moment import Moment, moment_of
+from trdlab.explanations.explanation import PARTS, Explanation, Part
+from trdlab.explanations.moment.moment import Choice, Moment, moment_of
+from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld
 from trdlab.show.plots.calibration import trust_figure
 from trdlab.show.plots.comparison import comparison_figure
 from trdlab.show.plots.episode import story_figure
-from trdlab.show.plots.map import report_figure, world_figure
+from trdlab.show.plots.map import solved_figure, world_figure
 from trdlab.show.plots.moment import moment_figure, possible_range
 from trdlab.show.plots.style import check_pictures, save
-from trdlab.show.report import Report
-from trdlab.show.story import story_sentence
 from trdlab.tabular import ExactTable
 
 
@@ -43,7 +41,7 @@ def figure(thing: Any, **how: Any) -> Figure:
     raise InputError(f"There is no picture of a {type(thing).__name__}.", f"Draw one of: {known}.")
 
 
-def explained_figure(explained: Explained, part: Part | None = None) -> Figure:
+def explanation_figure(explained: Explanation, part: Part | None = None) -> Figure:
     """Returns the picture of a part, by default of the first one there is.
 
     Raises:
@@ -55,14 +53,14 @@ def explained_figure(explained: Explained, part: Part | None = None) -> Figure:
     raise InputError("There is nothing to draw.", "Ask for a part that there is a picture of.")
 
 
-def part_figure(explained: Explained, part: Part) -> Figure | None:
+def part_figure(explained: Explanation, part: Part) -> Figure | None:
     """Returns the picture of a part; None where there is nothing to draw."""
     agent, report, told = explained.agent, explained.report, explained.story
     if part == "calibration":
         return None if report is None else trust_figure(report, agent.name)
     if part == "episode":
         return None if told is None else _episode(explained, told)
-    found, trial = explained.explanation, explained.trial
+    found, trial = explained.choice, explained.trial
     if found is None or (part == "contrast" and found.foil is None):
         return None
     return moment_figure(
@@ -96,7 +94,7 @@ def picture_paths(
     return paths
 
 
-def write_pictures(explained: Explained, paths: dict[Part, Path]) -> list[Path]:
+def write_pictures(explained: Explanation, paths: dict[Part, Path]) -> list[Path]:
     """Writes the pictures of an explained agent that there are, and returns their paths.
 
     Raises:
@@ -109,13 +107,13 @@ def write_pictures(explained: Explained, paths: dict[Part, Path]) -> list[Path]:
     return [path for path, _ in written]
 
 
-def _episode(explained: Explained, told: Story) -> Figure:
+def _episode(explained: Explanation, told: Story) -> Figure:
     agent, report = explained.agent, explained.report
     return story_figure(
         told,
         f"{agent.name}, the episode with seed {explained.seed}",
         trust=None if report is None else report.trust,
-        captions=[story_sentence(claim, told.played) for claim in told.moments],
+        captions=[claim.sentence for claim in told.moments],
         world=agent.world if isinstance(agent.world, Gridworld) else None,
         table=agent.estimator if isinstance(agent.estimator, ExactTable) else None,
     )
@@ -129,12 +127,12 @@ def _of_table(table: ExactTable, **how: Any) -> Figure:
 _FIGURES: dict[type, Callable[..., Figure]] = {
     Comparison: comparison_figure,
     ExactTable: _of_table,
-    Explained: explained_figure,
-    Explanation: lambda of, **how: moment_figure(of.moment, of.action, of.foil, **how),
+    Explanation: explanation_figure,
+    Choice: lambda of, **how: moment_figure(of.moment, of.action, of.foil, **how),
     Gridworld: world_figure,
-    Moment: lambda of, **how: moment_figure(of, *of.pair(None, None), **how),
+    Moment: lambda of, **how: figure(of.choice(), **how),
     Played: lambda of, **how: story_figure(tell(of), **how),
-    Report: report_figure,
+    SolvedState: solved_figure,
     Story: story_figure,
-    TrustReport: trust_figure,
+    CalibrationReport: trust_figure,
 }

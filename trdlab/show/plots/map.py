@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from trdlab.arrays import FloatArray
+from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.gridmap import MOVES
 from trdlab.gridworld.render import ABOVE_ROUTES, draw_map
 from trdlab.rollouts.episodes import Episode
-from trdlab.show.gridworld import GridworldReport
 from trdlab.show.plots import bars, style
 from trdlab.show.plots.moment import (
     EXPECTED,
@@ -26,7 +26,7 @@ from trdlab.show.plots.moment import (
     possible_range,
     without_noise,
 )
-from trdlab.show.report import Report, Scene
+from trdlab.show.scenes import Scene, scene_of
 from trdlab.tabular import ExactTable
 
 _MOST_ROUTE_STEPS = 1_000
@@ -35,23 +35,24 @@ _TALLEST = 3.2  # inches
 
 
 @style.settings()
-def report_figure(report: Report) -> Figure:
+def solved_figure(solved: SolvedState) -> Figure:
     """Returns the picture of a solved world: its map, and below it the bars of a state."""
-    found, scene, table = report.explanation, report.scene, report.table
-    world = report.world if isinstance(report, GridworldReport) else None
+    choice, table, scene = solved.choice, solved.table, scene_of(solved.world, solved.state)
+    world = solved.world if isinstance(solved.world, Gridworld) else None
     words = max(1.6 * len(scene.drawing.splitlines()), 3.0 + len(scene.legend))
     top = 0.2 * words if world is None else map_height(world)
-    panels = 1 if found.foil is None else 3
+    panels = 1 if choice.foil is None else 3
     figure = style.new_figure(1.6 + top + PANEL * panels, scene.caption)
     first, *rest = figure.subplots(1 + panels, 1, height_ratios=(top, *(PANEL,) * panels))
     if world is None:
-        plot_scene(first, scene, report.state)
+        plot_scene(first, scene, solved.state)
     else:
-        plot_map(first, world, table, report.state, found.action, found.foil)
-    moment = without_noise(found.moment, float(table.solution.error_bound[report.state].max()))
-    plot_moment(rest, moment, found.action, found.foil, possible=possible_range(table))
+        plot_map(first, world, table, solved.state, choice.action, choice.foil)
+    bound = float(table.solution.error_bound[solved.state].max())
+    moment = without_noise(choice.moment, bound)
+    plot_moment(rest, moment, choice.action, choice.foil, possible=possible_range(table))
     rest[len(rest) // 2].set_ylabel(EXPECTED)
-    explain_marks(figure, moment, found.action, found.foil)
+    explain_marks(figure, moment, choice.action, choice.foil)
     return figure
 
 

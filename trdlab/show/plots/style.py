@@ -20,6 +20,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import OutputError
@@ -37,10 +38,14 @@ EXPECTED, COST = "#1d3557", "#b3224a"
 """Rewards and costs that are expected."""
 AGENTS = ("#4b2e83", "#b9a7dc")
 """Two agents that are compared, the dark one first."""
-TRUSTED, WRONG, OPEN = "#dcecd8", "#f8dcdc", "#ececec"
-"""Evidence: proved, disproved, and neither."""
-FADED = 0.3
-"""The opacity of what has not proved to be trustworthy."""
+EVIDENCE = {"good": "#dcecd8", "bad": "#f8d3cf", "open": "#ececec", "not tested": "#ececec"}
+"""The ground that forecasts stand on: proved, disproved, and neither."""
+GROUNDS = {
+    EVIDENCE["good"]: "better than a guess",
+    EVIDENCE["bad"]: "no better than a guess",
+    EVIDENCE["open"]: "open, or not tested",
+}
+"""What a ground means."""
 
 _ACTIONS = (  # those of Okabe and Ito come first, and go to the directions
     *("#0072b2", "#e69f00", "#009e73", "#cc79a7"),
@@ -188,6 +193,18 @@ def label_steps(ax: Axes, axis: TimeAxis, places: FloatArray) -> None:
     shown.append(axis.horizon)
     ax.set_xticks(places[shown], [axis.labels[i] for i in shown])
     ax.set_xlim(places[0] - 0.6, places[-1] + 0.6)
+
+
+def draw_grounds(ax: Axes, places: FloatArray, status: Sequence[str]) -> None:
+    """Colours the ground of components by the evidence for them."""
+    for place, found in zip(places, status, strict=True):
+        ax.axvspan(place - 0.5, place + 0.5, color=EVIDENCE[found], linewidth=0, zorder=0)
+
+
+def ground_handles(status: Collection[str]) -> list[Patch]:
+    """Returns what a legend explains of grounds: only those that there are."""
+    there = {EVIDENCE[found] for found in status}
+    return [Patch(color=c, label=meaning) for c, meaning in GROUNDS.items() if c in there]
 
 
 def add_legend(figure: Figure, handles: Sequence[Artist], *lines: str) -> None:

@@ -184,11 +184,14 @@ def test_options_of_every_type_and_which_of_preset_file_and_option_wins(trdlab, 
         (["gym", "CartPole-v1", "--config", "none.toml"], "'none.toml' cannot be read"),
         (["gym", "CartPole-v1", "--learning-rat", "1"], "No such option: --learning-rat (Possible"),
         (["gym", "CartPole-v1", "--N", "2.5"], "Invalid value for '--N'"),
-        (["gym", "CartPole-v1", "--N", "-1"], "The horizon N is -1. It must be"),
+        (["gym", "CartPole-v1", "--N", "-1"], "The setting N is -1. It must be from 0 to 10,000."),
         (["gym", "CartPole-v1", "--gamma", "1"], "gamma is 1.0. It must be at least 0"),
         (["gym", "CartPole-v1", "--hidden", "64,x"], "--hidden is '64,x': give sizes, such as"),
-        (["gym", "CartPole-v1", "--hidden", "0"], "--hidden is (0,). It must be sizes above 0."),
-        (["gym", "CartPole-v1", "--epsilon-end", "2"], "--epsilon-end is 2.0. It must be from 0"),
+        (["gym", "CartPole-v1", "--hidden", "0"], "The setting hidden is 0. It must be from 1 to"),
+        (
+            ["gym", "CartPole-v1", "--epsilon-end", "2"],
+            "The setting epsilon_end is 2.0. It must be from 0",
+        ),
         (["gym", "CartPole-v1", "--seed", str(2**64)], "It must be less than 2**63."),
         (
             ["gym", "CartPole-v1", "--num-envs", "1", "--learning-starts", "3", "--w", "4"],
@@ -205,6 +208,63 @@ def test_what_cannot_be_used_is_refused_in_one_line(trdlab, tmp_path, monkeypatc
         assert message in err
         assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["--N", 10**24], 2, "The setting N is 1000000000000000000000000. It must be from 0 to"),
+        (["--N", 10**6], 2, "The setting N is 1000000."),
+        (["--batch-size", 10**22], 2, "The setting batch_size is 1"),
+        (["--batch-size", 10**8], 2, "A batch of 100000000 windows is larger than a replay memory"),
+        (["--batch-size", 10**8, "--capacity", 10**8], 1, "Learning with this network and batch"),
+        (
+            ["--hidden", "1000000,1000000"],
+            1,
+            "Learning with this network and batch takes about 200",
+        ),
+        (["--hidden", 10**13], 2, "The setting hidden is 10000000000000."),
+        (["--threads", 10**5], 2, "The setting threads is 100000, and the machine has"),
+        (["--threads", 10**30], 2, "It must be less than 2**63."),
+        (["--num-envs", 10**9], 2, "The setting num_envs is 1000000000."),
+        (["--capacity", 10**17], 1, "A replay memory of 100000000000000000 transitions takes"),
+        (["--w", 10**15, "--learning-starts", 10**15], 2, "Choose 8000000000000000 or more."),
+        (["--agent-steps", 10**30], 2, "It must be less than 2**63."),
+        (["--agent-steps", -5], 2, "The setting agent_steps is -5."),
+        (["--evaluate-episodes", 10**12], 2, "It must be from 0 to 100,000."),
+        (["--gamma", "nan"], 2, "gamma is nan."),
+        (["--gamma", "-inf"], 2, "gamma is -inf."),
+        (
+            ["--epsilon-start", "nan"],
+            2,
+            "The setting epsilon_start is nan. It must be from 0 to 1.",
+        ),
+        (["--epsilon-end", "-0.1"], 2, "The setting epsilon_end is -0.1."),
+        (["--evaluate-epsilon", "inf"], 2, "The setting evaluate_epsilon is inf."),
+        (["--learning-rate", "nan"], 2, "The learning rate is nan."),
+        (["--learning-rate", "inf"], 2, "The learning rate is inf."),
+        (["--learning-rate-end", "nan"], 2, "The setting learning_rate_end is nan."),
+        (["--device", "cpu:x"], 2, "PyTorch finds no device 'cpu:x' here."),
+        (["--config", "/dev/zero"], 2, "'/dev/zero' is a device. Name a text file."),
+    ],
+)
+def test_what_cannot_fit_or_be_meant_is_refused_before_work_begins(
+    trdlab, tmp_path, monkeypatch, words, code, message
+):
+    monkeypatch.chdir(tmp_path)
+    for more in ([], ["--dry-run"]):
+        refused, out, err = trdlab("train", "gym", "CartPole-v1", *words, *more)
+        assert (refused, out, err.count("\n")) == (code, "", 1)
+        assert err.startswith("error: ")
+        assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_settings_of_a_file_and_of_the_command_are_checked_together(trdlab, tmp_path):
+    file = tmp_path / "run.toml"
+    file.write_text("w = 20\nlearning_starts = 30")  # too few for the environments of the preset
+    words = ("--config", file, "--num-envs", 1, "--dry-run")
+    assert planned(trdlab("train", "gym", "CartPole-v1", *words))["learning_starts"] == 30
 
 
 @pytest.mark.parametrize(
@@ -265,6 +325,9 @@ def test_an_evaluation_as_json(trdlab, trained):
     code, _, err = trdlab("evaluate", trained, "--epsilon", 2)
     assert code == 2
     assert "Invalid value for '--epsilon'" in err
+    code, _, err = trdlab("evaluate", trained, "--epsilon", "nan")
+    message = "error: The chance of a random action is nan. It lies from 0 to 1.\n"
+    assert (code, err) == (2, message)
 
 
 def test_the_list_of_runs(trdlab, trained, tmp_path):

@@ -4,7 +4,7 @@ No torch here: options are read, listed and refused before anything heavy is imp
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any, Literal, Self, get_args
 
 from trdlab.decomposition import TimeAxis
@@ -12,6 +12,8 @@ from trdlab.errors import InputError, closest
 
 Kind = Literal["gym", "atari"]
 Reduction = Literal["sum", "mean"]
+
+_LARGE = 2**63 - 1  # what a file, and a computer, can hold of a whole number
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,8 @@ def _option(
     key: str | None = None,
     kind: type | None = None,
     metavar: str | None = None,
+    least: float | None = None,
+    most: float = _LARGE,
 ) -> Any:
     """Returns a field that is an option of the commands, and a line of the configuration.
 
@@ -67,9 +71,12 @@ def _option(
         key: what it is called outside, if not like the field.
         kind: the type of its values, or of their elements; by default that of the default.
         metavar: what the help calls a value, if not by its type.
+        least: of numbers, or of each element; without it, they are checked elsewhere.
+        most: likewise.
     """
     metadata = {"help": about, "panel": panel, "key": key, "metavar": metavar}
-    return field(default=default, metadata={**metadata, "kind": kind or type(default)})
+    metadata |= {"kind": kind or type(default), "least": least, "most": most}
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -95,26 +102,39 @@ class TrainSettings:
     env_arg: tuple[str, ...] = _option(
         (), "To make the environment with.", "Run", kind=str, metavar="KEY=VALUE"
     )
-    seed: int = _option(1, "Of the weights, the environments and every choice.", "Run")
-    agent_steps: int = _option(100_000, "Steps to take, of all environments together.", "Run")
-    num_envs: int = _option(1, "Environments side by side.", "Run")
-    gamma: float = _option(0.99, "Discount factor of a step, in [0, 1).", "Time axis")
-    horizon: int = _option(10, "Number of explicit components; 0 is DQN.", "Time axis", key="N")
-    width: int = _option(1, "Steps in each component.", "Time axis", key="w")
-    epsilon_start: float = _option(1.0, "Chance of a random action at first.", "Acting")
-    epsilon_end: float = _option(0.05, "… and in the end.", "Acting")
-    epsilon_steps: int = _option(10_000, "Agent steps from the one to the other.", "Acting")
-    learning_starts: int = _option(
-        1_000, "Agent steps, at random, before the first update.", "Learning"
+    seed: int = _option(1, "Of the weights, the environments and every choice.", "Run", least=0)
+    agent_steps: int = _option(
+        100_000, "Steps to take, of all environments together.", "Run", least=1
     )
-    update_every: int = _option(4, "Agent steps for each update.", "Learning")
-    batch_size: int = _option(32, "Windows in each update.", "Learning")
+    num_envs: int = _option(1, "Environments side by side.", "Run", least=1, most=10_000)
+    gamma: float = _option(0.99, "Discount factor of a step, in [0, 1).", "Time axis")
+    horizon: int = _option(
+        10, "Number of explicit components; 0 is DQN.", "Time axis", key="N", least=0, most=10_000
+    )
+    width: int = _option(1, "Steps in each component.", "Time axis", key="w", least=1)
+    epsilon_start: float = _option(
+        1.0, "Chance of a random action at first.", "Acting", least=0, most=1
+    )
+    epsilon_end: float = _option(0.05, "… and in the end.", "Acting", least=0, most=1)
+    epsilon_steps: int = _option(
+        10_000, "Agent steps from the one to the other.", "Acting", least=0
+    )
+    learning_starts: int = _option(
+        1_000, "Agent steps, at random, before the first update.", "Learning", least=1
+    )
+    update_every: int = _option(4, "Agent steps for each update.", "Learning", least=1)
+    batch_size: int = _option(32, "Windows in each update.", "Learning", least=1)
     learning_rate: float = _option(1e-3, "Adam's, at first.", "Learning")
     learning_rate_end: float | None = _option(
-        None, "… and in the end, falling evenly; without it, the same.", "Learning", kind=float
+        None,
+        "… and in the end, falling evenly; without it, the same.",
+        "Learning",
+        kind=float,
+        least=0,
+        most=1,
     )
     target_sync_updates: int = _option(
-        250, "Updates (not steps) between copies to the target network.", "Learning"
+        250, "Updates (not steps) between copies to the target network.", "Learning", least=1
     )
     reduction: Literal["sum", "mean"] = _option(
         "sum", "Over components: sum, or the paper's mean.", "Learning"
@@ -122,7 +142,13 @@ class TrainSettings:
     double: bool = _option(False, "Double DQN: the online network chooses.", "Learning")
     bf16: bool = _option(False, "Compute in bfloat16: quicker, less exact.", "Learning")
     hidden: tuple[int, ...] = _option(
-        (128, 128), "Layers of the MLP, for vectors.", "Learning", kind=int, metavar="SIZE,SIZE"
+        (128, 128),
+        "Layers of the MLP, for vectors.",
+        "Learning",
+        kind=int,
+        metavar="SIZE,SIZE",
+        least=1,
+        most=1_000_000,
     )
     weights: str | None = _option(
         None,
@@ -131,37 +157,49 @@ class TrainSettings:
         kind=str,
         metavar="FILE",
     )
-    capacity: int = _option(100_000, "Transitions that the replay memory holds.", "Learning")
+    capacity: int = _option(
+        100_000, "Transitions that the replay memory holds.", "Learning", least=1
+    )
     clip_rewards: bool = _option(False, "Learn from the sign of each reward.", "Reward and ending")
     life_loss_ends: bool = _option(
         False, "Learn as if a lost life ended the episode.", "Reward and ending"
     )
-    evaluate_episodes: int = _option(30, "Episodes of the final evaluation; 0: none.", "Evaluation")
-    evaluate_epsilon: float = _option(0.0, "Chance of a random action in it.", "Evaluation")
-    checkpoint_every: int = _option(20_000, "Agent steps between two checkpoints.", "Running")
-    log_every: int = _option(1_000, "Agent steps between two lines of metrics.", "Running")
+    evaluate_episodes: int = _option(
+        30, "Episodes of the final evaluation; 0: none.", "Evaluation", least=0, most=100_000
+    )
+    evaluate_epsilon: float = _option(
+        0.0, "Chance of a random action in it.", "Evaluation", least=0, most=1
+    )
+    checkpoint_every: int = _option(
+        20_000, "Agent steps between two checkpoints.", "Running", least=1
+    )
+    log_every: int = _option(1_000, "Agent steps between two lines of metrics.", "Running", least=1)
     tensorboard: bool = _option(False, "Write metrics for TensorBoard, too.", "Running")
     device: str = _option("auto", "cpu, cuda, mps, or auto: what is there.", "Running")
-    threads: int = _option(0, "Of PyTorch on the CPU; 0: what suits the network.", "Running")
+    threads: int = _option(
+        0, "Of PyTorch on the CPU; 0: what suits the network.", "Running", least=0
+    )
 
     def __post_init__(self) -> None:
-        for name in _POSITIVE:
-            _require(getattr(self, name) >= 1, name, getattr(self, name), "1 or more")
-        for name in _NOT_NEGATIVE:
-            _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
-        for name in ("epsilon_start", "epsilon_end", "evaluate_epsilon"):
-            _require(0 <= getattr(self, name) <= 1, name, getattr(self, name), "from 0 to 1")
-        _require(self.seed < 2**63, "seed", self.seed, "less than 2**63")
-        end = self.learning_rate_end
-        _require(end is None or 0 <= end < float("inf"), "learning_rate_end", end, "0 or more")
-        _require(all(size >= 1 for size in self.hidden), "hidden", self.hidden, "sizes above 0")
+        for of in fields(self):
+            _check_range(of, getattr(self, of.name))
         self.time_axis  # noqa: B018  checks γ, N and w
         self.update_settings  # noqa: B018  checks the rest
-        if self.learning_starts < self.width * self.num_envs:
+        self._check_together()
+
+    def _check_together(self) -> None:
+        windows = self.width * self.num_envs
+        if self.learning_starts < windows:
             raise InputError(
-                f"--learning-starts is {self.learning_starts}: not one window of w = {self.width} "
-                f"steps is full by then.",
-                f"Choose {self.width * self.num_envs} or more.",
+                f"The setting learning_starts is {self.learning_starts}: not one window of "
+                f"w = {self.width} steps is full by then.",
+                f"Choose {windows} or more.",
+            )
+        if self.batch_size > self.capacity:
+            raise InputError(
+                f"A batch of {self.batch_size} windows is larger than a replay memory of "
+                f"{self.capacity} transitions.",
+                "Choose a smaller batch_size or a larger capacity.",
             )
 
     @property
@@ -254,8 +292,11 @@ def _fits(value: Any, kind: type) -> bool:
     """Returns whether a value is of a type; whole numbers may be written like 1e6."""
     if kind in (bool, str):
         return isinstance(value, kind)
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and (kind is float or value % 1 == 0)
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    if kind is int:
+        return value % 1 == 0
+    return isinstance(value, float) or abs(value) < 2**1023  # 10**400 is no float
 
 
 def _names() -> dict[str, str]:
@@ -263,17 +304,19 @@ def _names() -> dict[str, str]:
     return {f.metadata.get("key") or f.name: f.name for f in fields(TrainSettings)}
 
 
-_POSITIVE = (
-    "agent_steps", "num_envs", "update_every", "batch_size", "capacity", "learning_starts",
-    "checkpoint_every", "log_every",
-)  # fmt: skip
-_NOT_NEGATIVE = ("seed", "epsilon_steps", "evaluate_episodes", "threads")
-
-
 _SINGULAR = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 _PLURAL = {int: "whole numbers", str: "texts"}
 
 
-def _require(holds: bool, name: str, value: object, range_: str) -> None:
-    if not holds:
-        raise InputError(f"--{name.replace('_', '-')} is {value}.", f"It must be {range_}.")
+def _check_range(of: Field[Any], value: Any) -> None:
+    """Refuses a value, or an element of it, that is out of the range of its option."""
+    least, most = of.metadata.get("least"), of.metadata.get("most")
+    if least is None or value is None:
+        return
+    for each in value if isinstance(value, tuple) else (value,):
+        if not least <= each <= most:  # nor is NaN
+            wanted = f"{least} or more" if each < least else "less than 2**63"
+            raise InputError(
+                f"The setting {of.metadata['key'] or of.name} is {each}.",
+                f"It must be {wanted if most == _LARGE else f'from {least} to {most:,}'}.",
+            )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 
 from trdlab.deep.settings import TrainSettings
-from trdlab.errors import TrdlabError
+from trdlab.errors import InputError, TrdlabError
 from trdlab.evaluation import Evaluation, evaluate
 from trdlab.files import write_json
 from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
@@ -88,9 +88,11 @@ def evaluate_run(
     settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
     step = checkpoint_steps(folder)[-1] if step is None and checkpoint_steps(folder) else step
     use_threads(settings)
+    chance = settings.evaluate_epsilon if epsilon is None else epsilon
+    if not 0.0 <= chance <= 1.0:  # nor is NaN
+        raise InputError(f"The chance of a random action is {chance}.", "It lies from 0 to 1.")
     estimator = load(path, step)
     count = episodes or settings.evaluate_episodes or 30
-    chance = settings.evaluate_epsilon if epsilon is None else epsilon
     environments = make_environments(settings, num_envs=count, seed=seed)
     try:
         result = evaluate(estimator, environments, epsilon=chance, seed=seed, on_episode=on_episode)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from trdlab.deep.board import board, check_board
-from trdlab.deep.memory import check_memory
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
 from trdlab.deep.weights import read_weights
@@ -23,9 +22,9 @@ from trdlab.runs import (
 )
 from trdlab.runs.folder import check_free
 from trdlab.training.setup import (
+    check_fits,
     describe,
     make_environments,
-    memory_of,
     new_trainer,
     resolved,
 )
@@ -71,7 +70,7 @@ def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
     Raises:
         InputError: the environments cannot be made, or have no network.
         OutputError: the folder exists, or cannot be written.
-        TrdlabError: the replay memory does not fit into what is free.
+        TrdlabError: it does not fit into what is free.
     """
     with ExitStack() as stack:
         check_free(path)
@@ -161,9 +160,9 @@ def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
     check_board(wanted=settings.tensorboard)
     environments = make_environments(settings)
     stack.callback(environments.close)
-    memory = memory_of(settings, environments)
-    check_memory(memory, settings.capacity)
-    return new_trainer(resolved(settings, environments), environments), memory
+    settings = resolved(settings, environments)
+    memory = check_fits(settings, environments)
+    return new_trainer(settings, environments), memory
 
 
 def _restore(

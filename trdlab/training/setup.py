@@ -12,12 +12,13 @@ import gymnasium as gym
 import numpy as np
 
 from trdlab.deep.presets import preset
-from trdlab.deep.settings import Kind, TrainSettings
+from trdlab.deep.settings import Kind, TrainSettings, checked
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.stack import observation_space
 from trdlab.errors import InputError
 from trdlab.estimator import Future
+from trdlab.files import check_small_text
 from trdlab.runs import free_name, read_config
 
 if TYPE_CHECKING:
@@ -40,16 +41,18 @@ def read_settings(
     Raises:
         InputError: there is no such preset or file, or a key or value cannot be used.
     """
-    settings = preset(kind, env, preset_name)
+    base, in_file = preset(kind, env, preset_name), {}
     if config is not None:
+        check_small_text(config)
         lines = read_config(config)
         for key, here in (("kind", kind), ("env", env)):
             if lines.get(key, here) != here:
                 raise InputError(f"'{config}' is for another {key}.", f"Here it is '{here}'.")
-        complete = lines.keys() >= {"kind", "env"}
-        base = TrainSettings(kind, env) if complete else settings
-        settings = base.changed(lines, f"'{config}'")
-    return settings.changed(given, "The command")
+        if lines.keys() >= {"kind", "env"}:
+            base = TrainSettings(kind, env)
+        in_file = checked(lines, f"'{config}'")
+    # together, since one may only be in its range beside another
+    return replace(base, **{**in_file, **checked(given, "The command")})
 
 
 def default_path(settings: TrainSettings) -> Path:
@@ -116,6 +119,40 @@ def memory_of(
         num_envs=environments.num_envs,
         frame_nbytes=frame_nbytes,
     )
+
+
+def check_fits(settings: TrainSettings, environments: Environments) -> int:
+    """Refuses a run that this machine cannot hold; returns the bytes of its replay memory.
+
+    Args:
+        settings: as resolved.
+        environments: what it learns from.
+
+    Raises:
+        InputError: it wants more threads than there are processors.
+        TrdlabError: the replay memory, or the network with a batch, does not fit into what is free.
+    """
+    from trdlab.deep.memory import check_learner, check_memory
+    from trdlab.deep.networks import build_network, learner_nbytes
+
+    processors = os.cpu_count() or 1
+    if settings.threads > max(processors, _cores()):
+        raise InputError(
+            f"The setting threads is {settings.threads}, and the machine has {processors} "
+            f"processor{'' if processors == 1 else 's'}.",
+            "Choose at most as many, or 0.",
+        )
+    memory = memory_of(settings, environments)
+    check_memory(memory, settings.capacity)
+    network = build_network(
+        observation_space(environments),
+        environments.num_actions,
+        settings.time_axis,
+        seed=None,
+        hidden=settings.hidden,
+    )
+    check_learner(learner_nbytes(network, settings.batch_size), _free_on(settings.device))
+    return memory
 
 
 def use_threads(settings: TrainSettings) -> None:
@@ -197,15 +234,15 @@ def plan(settings: TrainSettings) -> Plan:
 
     Raises:
         InputError: the environments cannot be made, or have no network.
-        TrdlabError: the replay memory does not fit into what is free.
+        TrdlabError: the run does not fit into what is free.
     """
-    from trdlab.deep.memory import available_memory, check_memory
+    from trdlab.deep.memory import available_memory
     from trdlab.deep.weights import read_weights
 
     environments = make_environments(settings)
     try:
         settings = resolved(settings, environments)
-        check_memory(memory_of(settings, environments), settings.capacity)
+        check_fits(settings, environments)
         warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
         begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)
         trainer = new_trainer(begun, environments)
@@ -263,11 +300,24 @@ def _device(wanted: str) -> str:
         found.append("mps")
     if wanted == "auto":
         return found[1] if len(found) > 1 else "cpu"
-    if wanted.partition(":")[0] not in found:
+    try:
+        known = torch.device(wanted).type in found
+    except RuntimeError:  # it is no device anywhere
+        known = False
+    if not known:
         raise InputError(
             f"PyTorch finds no device '{wanted}' here.", f"Use one of: auto, {', '.join(found)}."
         )
     return wanted
+
+
+def _free_on(device: str) -> int | None:
+    """Returns the bytes that are free where a network is to learn; None if unknown."""
+    import torch
+
+    from trdlab.deep.memory import available_memory
+
+    return torch.cuda.mem_get_info(device)[0] if "cuda" in device else available_memory()
 
 
 def _for_atari(arguments: dict[str, Any]) -> dict[str, Any]:

@@ -169,7 +169,7 @@ def test_updates_that_are_due():
 def test_an_update_is_told_its_share():
     settings = GYM.changed({"learning_rate": 0.25, "double": True, "reduction": "mean"})
     assert settings.update_settings == UpdateSettings(0.25, 250, "mean", double=True)
-    assert UpdateSettings() == UpdateSettings(1e-4, 1000, "sum", double=False, bf16=False)
+    assert UpdateSettings() == UpdateSettings(1e-4, 1000, "sum", double=False, precision="float32")
 
 
 def test_every_preset_can_be_used_and_says_what_it_is_for():

@@ -217,6 +217,18 @@ def test_a_run_without_a_checkpoint_begins_again(tmp_path, whole, steps):
     assert result(finish(out)) == result(whole)
 
 
+def test_the_precision_that_was_measured_is_kept(tmp_path, monkeypatch):
+    quicker = "trdlab.deep.precision.quicker_precision"
+    monkeypatch.setattr(quicker, lambda *_: "bfloat16")
+    whole = train(tmp_path / "whole", precision="auto")
+    out = train_until(50, tmp_path / "run", precision="auto")
+    monkeypatch.setattr(quicker, lambda *_: "float32")  # on another day, or machine
+    assert result(finish(out)) == result(whole)
+    assert RunFolder.open(out).config["precision"] == "bfloat16"
+    exact = train(tmp_path / "exact", precision="float32")
+    assert result(exact) != result(whole)
+
+
 def test_an_older_checkpoint_can_be_gone_back_to(trained, whole):
     assert result(finish(trained, step=90)) == result(whole)
     with pytest.raises(InputError, match=r"no checkpoint at step 60\. There are: 90, 120\."):

@@ -12,6 +12,7 @@ from trdlab.deep.replay import ReplayBuffer
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError
 from trdlab.runs import to_toml
+from trdlab.training.machine import resolved
 from trdlab.training.setup import (
     default_path,
     describe,
@@ -19,7 +20,6 @@ from trdlab.training.setup import (
     make_environments,
     plan,
     read_settings,
-    resolved,
 )
 
 CART = TrainSettings("gym", "CartPole-v1")

@@ -12,6 +12,7 @@ from trdlab.errors import InputError, closest
 
 Kind = Literal["gym", "atari"]
 Reduction = Literal["sum", "mean"]
+Precision = Literal["float32", "bfloat16"]
 
 _LARGE = 2**63 - 1  # what a file, and a computer, can hold of a whole number
 
@@ -26,8 +27,8 @@ class UpdateSettings:
             the target network (errata C6).
         reduction: over components, see `td_loss`.
         double: whether the online network chooses the next action (double DQN).
-        bf16: whether the networks compute in bfloat16, which keeps two or three digits; weights,
-            targets and the loss stay float32.
+        precision: what the networks compute in; bfloat16 keeps two or three digits. Weights,
+            targets and the loss are float32 in either case.
 
     Raises:
         InputError: a value is out of its range.
@@ -37,7 +38,7 @@ class UpdateSettings:
     target_sync_updates: int = 1000
     reduction: Reduction = "sum"
     double: bool = False
-    bf16: bool = False
+    precision: Precision = "float32"
 
     def __post_init__(self) -> None:
         if not 0.0 < self.learning_rate < float("inf"):
@@ -49,6 +50,9 @@ class UpdateSettings:
             )
         if self.reduction not in get_args(Reduction):
             raise InputError(f"The reduction is {self.reduction!r}.", "Use 'sum' or 'mean'.")
+        if self.precision not in get_args(Precision):
+            cure = closest(self.precision, (*get_args(Precision), "auto"))
+            raise InputError(f"The precision is {self.precision!r}.", cure)
 
 
 def _option(
@@ -140,7 +144,11 @@ class TrainSettings:
         "sum", "Over components: sum, or the paper's mean.", "Learning"
     )
     double: bool = _option(False, "Double DQN: the online network chooses.", "Learning")
-    bf16: bool = _option(False, "Compute in bfloat16: quicker, less exact.", "Learning")
+    precision: Literal["auto", "float32", "bfloat16"] = _option(
+        "float32",
+        "float32; bfloat16, less exact and often quicker; or auto: the quicker one here.",
+        "Learning",
+    )
     hidden: tuple[int, ...] = _option(
         (128, 128),
         "Layers of the MLP, for vectors.",
@@ -209,8 +217,10 @@ class TrainSettings:
 
     @property
     def update_settings(self) -> UpdateSettings:
-        """What an update is told."""
-        return UpdateSettings(**{f.name: getattr(self, f.name) for f in fields(UpdateSettings)})
+        """What an update is told; in float32 as long as the precision is `auto`."""
+        told = {of.name: getattr(self, of.name) for of in fields(UpdateSettings)}
+        exact = {"precision": "float32"} if self.precision == "auto" else {}
+        return UpdateSettings(**told | exact)
 
     def epsilon(self, agent_steps: int) -> float:
         """Returns the chance of a random action after so many agent steps."""

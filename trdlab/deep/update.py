@@ -182,7 +182,8 @@ class Learner:
         A context of its own for each call: autocast caches the weights it has cast, and those of a
         call without gradients must not serve one with.
         """
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.settings.bf16):
+        reduced = self.settings.precision == "bfloat16"
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=reduced):
             components: Tensor = network(observations)
         return components.float()
 

@@ -11,7 +11,8 @@ from trdlab.errors import InputError, TrdlabError
 from trdlab.evaluation import Evaluation, evaluate
 from trdlab.files import write_json
 from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
-from trdlab.training.setup import described_space, future, make_environments, use_threads
+from trdlab.training.machine import use_threads
+from trdlab.training.setup import described_space, future, make_environments
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator

@@ -21,13 +21,8 @@ from trdlab.runs import (
     save_checkpoint,
 )
 from trdlab.runs.folder import check_free
-from trdlab.training.setup import (
-    check_fits,
-    describe,
-    make_environments,
-    new_trainer,
-    resolved,
-)
+from trdlab.training.machine import check_threads, memory_of, resolved
+from trdlab.training.setup import describe, make_environments, new_trainer
 
 
 @dataclass(eq=False)
@@ -74,6 +69,7 @@ def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
     """
     with ExitStack() as stack:
         check_free(path)
+        check_threads(settings)
         trainer, memory = _trainer(settings, stack)
         extra = {"environment": describe(trainer.environments), **_given_weights(trainer)}
         folder = RunFolder.create(path, trainer.settings.to_config(), extra)
@@ -161,8 +157,7 @@ def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
     environments = make_environments(settings)
     stack.callback(environments.close)
     settings = resolved(settings, environments)
-    memory = check_fits(settings, environments)
-    return new_trainer(settings, environments), memory
+    return new_trainer(settings, environments), memory_of(settings, environments)
 
 
 def _restore(

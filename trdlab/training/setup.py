@@ -1,6 +1,5 @@
 """What a run is made of, from its settings: the environments, the device, the plan."""
 
-import os
 import re
 import time
 from collections.abc import Mapping
@@ -20,6 +19,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.files import check_small_text
 from trdlab.runs import free_name, read_config
+from trdlab.training.machine import check_threads, memory_of, resolved, use_threads
 
 if TYPE_CHECKING:
     from trdlab.deep.trainer import Trainer
@@ -85,84 +85,6 @@ def make_environments(
     from trdlab.environments import GymEnvironments
 
     return GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments)
-
-
-def resolved(settings: TrainSettings, environments: Environments) -> TrainSettings:
-    """Returns the settings with what `auto`, 0 and a relative path stand for here.
-
-    Raises:
-        InputError: PyTorch does not find the device.
-    """
-    images = len(environments.observation_space.shape or ()) >= 2
-    threads = settings.threads or (_cores() if images else 1)
-    weights = str(Path(settings.weights).resolve()) if settings.weights else None
-    return replace(settings, device=_device(settings.device), threads=threads, weights=weights)
-
-
-def memory_of(
-    settings: TrainSettings, environments: Environments, frame_nbytes: float | None = None
-) -> int:
-    """Returns the bytes that the full replay memory of a run takes.
-
-    Args:
-        settings: with its capacity.
-        environments: what it remembers.
-        frame_nbytes: what a frame takes in it, if that has been measured.
-    """
-    from trdlab.deep.memory import memory_needed
-
-    space = environments.observation_space
-    return memory_needed(
-        settings.capacity,
-        space.shape or (),
-        np.dtype(space.dtype),
-        num_envs=environments.num_envs,
-        frame_nbytes=frame_nbytes,
-    )
-
-
-def check_fits(settings: TrainSettings, environments: Environments) -> int:
-    """Refuses a run that this machine cannot hold; returns the bytes of its replay memory.
-
-    Args:
-        settings: as resolved.
-        environments: what it learns from.
-
-    Raises:
-        InputError: it wants more threads than there are processors.
-        TrdlabError: the replay memory, or the network with a batch, does not fit into what is free.
-    """
-    from trdlab.deep.memory import check_learner, check_memory
-    from trdlab.deep.networks import build_network, learner_nbytes
-
-    processors = os.cpu_count() or 1
-    if settings.threads > max(processors, _cores()):
-        raise InputError(
-            f"The setting threads is {settings.threads}, and the machine has {processors} "
-            f"processor{'' if processors == 1 else 's'}.",
-            "Choose at most as many, or 0.",
-        )
-    memory = memory_of(settings, environments)
-    check_memory(memory, settings.capacity)
-    network = build_network(
-        observation_space(environments),
-        environments.num_actions,
-        settings.time_axis,
-        seed=None,
-        hidden=settings.hidden,
-    )
-    check_learner(learner_nbytes(network, settings.batch_size), _free_on(settings.device))
-    return memory
-
-
-def use_threads(settings: TrainSettings) -> None:
-    """Lets PyTorch use as many threads as a run was made for, in all of this process.
-
-    More of them make a small network slower, and other results than those of the run.
-    """
-    import torch
-
-    torch.set_num_threads(settings.threads)
 
 
 def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer":
@@ -239,10 +161,10 @@ def plan(settings: TrainSettings) -> Plan:
     from trdlab.deep.memory import available_memory
     from trdlab.deep.weights import read_weights
 
+    check_threads(settings)
     environments = make_environments(settings)
     try:
         settings = resolved(settings, environments)
-        check_fits(settings, environments)
         warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
         begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)
         trainer = new_trainer(begun, environments)
@@ -278,46 +200,6 @@ def _steps_per_second(trainer: "Trainer", *, until: int | None, at_most: float) 
             break
         trainer.step()
     return (trainer.agent_steps - before) / max(passed, 1e-9)
-
-
-def _cores() -> int:
-    """Returns how many threads may compute here: as the user says, or the system."""
-    told = os.environ.get("OMP_NUM_THREADS", "")
-    if told.isdigit() and int(told) > 0:
-        return int(told)
-    if hasattr(os, "sched_getaffinity"):  # a container may have fewer than the machine
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def _device(wanted: str) -> str:
-    import torch
-
-    found = ["cpu"]
-    if torch.cuda.is_available():
-        found.append("cuda")
-    if torch.backends.mps.is_available():
-        found.append("mps")
-    if wanted == "auto":
-        return found[1] if len(found) > 1 else "cpu"
-    try:
-        known = torch.device(wanted).type in found
-    except RuntimeError:  # it is no device anywhere
-        known = False
-    if not known:
-        raise InputError(
-            f"PyTorch finds no device '{wanted}' here.", f"Use one of: auto, {', '.join(found)}."
-        )
-    return wanted
-
-
-def _free_on(device: str) -> int | None:
-    """Returns the bytes that are free where a network is to learn; None if unknown."""
-    import torch
-
-    from trdlab.deep.memory import available_memory
-
-    return torch.cuda.mem_get_info(device)[0] if "cuda" in device else available_memory()
 
 
 def _for_atari(arguments: dict[str, Any]) -> dict[str, Any]:

@@ -310,6 +310,22 @@ def test_a_run_from_start_to_score(trdlab, tmp_path, monkeypatch):
     assert list(Path("runs/CartPole-v1-N2-w1-seed1-2/evaluations").iterdir()) == []
 
 
+def test_actions_are_called_as_people_say(trdlab, tmp_path):
+    words = ("train", "gym", "CartPole-v1", *SMALL, "--evaluate-episodes", 0, "--out")
+    assert trdlab(*words, tmp_path / "run", "--action-names", "push left, push right")[0] == 0
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    assert manifest["environment"]["action_names"] == ["push left", "push right"]
+    for names, message in (
+        ("left,right,up", "There are 3 names for 2 actions: left, right, up. Give one for each"),
+        ("left,left", "The action names are 'left', 'left'. Each has a name of its own."),
+    ):
+        for more in ([], ["--dry-run"]):
+            code, _, err = trdlab(*words, tmp_path / "no", "--action-names", names, *more)
+            assert (code, err.count("\n")) == (2, 1)
+            assert message in err
+    assert not (tmp_path / "no").exists()
+
+
 def test_an_evaluation_as_json(trdlab, trained):
     code, out, err = trdlab("evaluate", trained, "--episodes", 2, "--seed", 3, "--json")
     assert code == 0

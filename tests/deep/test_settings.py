@@ -27,6 +27,9 @@ GYM = TrainSettings("gym", "CartPole-v1")
             "learning_starts": st.integers(10, 1000),
             "learning_rate_end": st.floats(0, 1),
             "reduction": st.sampled_from(["sum", "mean"]),
+            "loss": st.sampled_from(["squared", "huber"]),
+            "max_grad_norm": st.floats(0.1, 10),
+            "action_names": st.lists(st.sampled_from("abc"), max_size=3, unique=True),
             "double": st.booleans(),
             "hidden": st.lists(st.integers(1, 512), max_size=3),
             "weights": st.text(),
@@ -46,6 +49,7 @@ def test_what_is_not_said_has_the_default_and_what_is_not_set_is_not_told():
     assert (told["N"], told["w"], told["hidden"]) == (10, 1, [128, 128])
     assert {of.metadata.get("key") or of.name for of in fields(TrainSettings)} - told.keys() == {
         "learning_rate_end",
+        "max_grad_norm",
         "weights",
     }
 
@@ -61,7 +65,7 @@ def test_whole_numbers_may_be_written_like_1e6():
     ("lines", "message"),
     [
         ({"learning_rat": 1}, "unknown key 'learning_rat'. Did you mean 'learning_rate'?"),
-        ({"horizon": 4}, "unknown key 'horizon'. Known: N, agent_steps"),
+        ({"horizon": 4}, "unknown key 'horizon'. Known: N, action_names"),
         ({"seed": "one"}, "has seed = 'one'. It must be a whole number."),
         ({"seed": 1.5}, "has seed = 1.5. It must be a whole number."),
         ({"seed": True}, "has seed = True. It must be a whole number."),
@@ -110,6 +114,11 @@ def test_a_configuration_says_what_it_is_for():
         ({"learning_rate_end": -0.1}, "learning_rate_end is -0.1. It must be from 0 to 1."),
         ({"target_sync_updates": 0}, "target_sync_updates is 0. It must be 1 or more."),
         ({"reduction": "max"}, "The reduction is 'max'. Use 'sum' or 'mean'."),
+        ({"loss": "hubert"}, "The loss is 'hubert'. Use 'squared' or 'huber'."),
+        ({"precision": "half"}, "The precision is 'half'. Use 'float32' or 'bfloat16'."),
+        ({"max_grad_norm": 0.0}, "max_grad_norm is 0.0. Choose a length above 0."),
+        ({"max_grad_norm": float("nan")}, "max_grad_norm is nan. Choose a length above 0."),
+        ({"action_names": ["up", "up"]}, "The action names are 'up', 'up'. Each has a name of"),
         ({"hidden": [0]}, "hidden is 0. It must be from 1 to 1,000,000."),
         ({"N": 10**24}, f"The setting N is {10**24}. It must be from 0 to 10,000."),
         ({"hidden": [64, 10**7]}, "hidden is 10000000. It must be from 1 to 1,000,000."),

@@ -119,6 +119,20 @@ def test_the_same_seed_learns_the_same_to_the_bit(settings):
     assert not torch.equal(one, other)
 
 
+def test_longer_gradients_are_cut_and_shorter_ones_left():
+    batch = random_batch(0)
+    plain, left, cut = learner(), learner(max_grad_norm=1e6), learner(max_grad_norm=0.5)
+    for run in (plain, left, cut):
+        run.update(batch)
+    flat = [
+        torch.cat([p.grad.flatten() for p in run.q_network.parameters()])
+        for run in (plain, left, cut)
+    ]
+    assert flat[0].norm() > 0.5
+    assert torch.equal(flat[0], flat[1])
+    torch.testing.assert_close(flat[2], flat[0] * 0.5 / flat[0].norm())
+
+
 def test_the_target_network_follows_every_few_updates():
     run = learner(target_sync_updates=3)
     start = weights(run.target_network)
@@ -211,7 +225,7 @@ def test_a_batch_that_does_not_fit_is_refused(changed, message):
         ({"learning_rate": float("nan")}, r"learning rate is nan"),
         ({"target_sync_updates": 0}, r"target_sync_updates is 0"),
         ({"reduction": "max"}, r"reduction is 'max'"),
-        ({"precision": "bfloat"}, r"precision is 'bfloat'\. Did you mean 'bfloat16'\?"),
+        ({"precision": "bfloat"}, r"precision is 'bfloat'\. Use 'float32' or"),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, message):

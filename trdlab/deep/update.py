@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from trdlab.deep.loss import finite_loss, of_actions, td_loss, trd_target
 from trdlab.deep.networks import DecompositionNetwork
@@ -114,11 +114,13 @@ class Learner:
             selected_by=chooser,
         )  # [B, N+1]
         components = self._components(self.q_network, observations)  # [B, A, N+1]
-        loss = td_loss(components, actions, target, settings.reduction)  # scalar
+        loss = td_loss(components, actions, target, settings.reduction, settings.loss)
         number = finite_loss(loss, self.num_updates + 1)
 
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
+        if settings.max_grad_norm is not None:
+            nn.utils.clip_grad_norm_(self.q_network.parameters(), settings.max_grad_norm)
         self.optimizer.step()
 
         self.num_updates += 1

@@ -71,7 +71,8 @@ def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
         check_free(path)
         check_threads(settings)
         trainer, memory = _trainer(settings, stack)
-        extra = {"environment": describe(trainer.environments), **_given_weights(trainer)}
+        seen = describe(trainer.environments, settings.action_names)
+        extra = {"environment": seen, **_given_weights(trainer)}
         folder = RunFolder.create(path, trainer.settings.to_config(), extra)
         stack.enter_context(folder.held())
         yield Run(folder, trainer, stack.enter_context(MetricsFile(folder.metrics, 0)), memory)

@@ -2,7 +2,7 @@
 
 import re
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,8 +95,22 @@ def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer
     return Trainer(settings, environments)
 
 
-def describe(environments: Environments) -> dict[str, Any]:
-    """Returns what must be known of environments to use their agent without them; plain data."""
+def describe(environments: Environments, action_names: Sequence[str] = ()) -> dict[str, Any]:
+    """Returns what must be known of environments to use their agent without them; plain data.
+
+    Args:
+        environments: which ones.
+        action_names: A names, where people call the actions otherwise than the environment.
+
+    Raises:
+        InputError: there are more or fewer names than actions.
+    """
+    if action_names and len(action_names) != environments.num_actions:
+        raise InputError(
+            f"There are {len(action_names)} names for {environments.num_actions} actions: "
+            f"{', '.join(action_names)}.",
+            "Give one for each action.",
+        )
     space = observation_space(environments)
     if isinstance(space, gym.spaces.Discrete):
         seen: dict[str, Any] = {"states": int(space.n), "first_state": int(space.start)}
@@ -106,7 +120,7 @@ def describe(environments: Environments) -> dict[str, Any]:
         "observation": seen,
         "num_actions": environments.num_actions,
         "first_action": environments.first_action,
-        "action_names": list(environments.action_names),
+        "action_names": list(action_names or environments.action_names),
         "time_limit": environments.time_limit,
         "frame_skip": environments.frame_skip,
         "frames_per_second": environments.frames_per_second,
@@ -165,6 +179,7 @@ def plan(settings: TrainSettings) -> Plan:
     environments = make_environments(settings)
     try:
         settings = resolved(settings, environments)
+        describe(environments, settings.action_names)  # refuses what a run would refuse
         warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
         begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)
         trainer = new_trainer(begun, environments)

@@ -376,6 +376,15 @@ def test_pipes_get_plain_text(trained, tmp_path):
     assert b"1 of 120 steps" not in done.stdout
 
 
+@pytest.mark.parametrize("words", [["runs", ".", "--plot"], ["gridworld", "--plot"]])
+def test_pictures_need_no_backend_of_a_notebook(tmp_path, trained, words, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(trained, tmp_path / "pole")
+    done = in_shell(*words, "picture.png", MPLBACKEND="module://matplotlib_inline.backend_inline")
+    assert done.returncode == 0, done.stderr.decode()
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+
+
 # ---- progress and signals ------------------------------------------------------------------------
 
 

@@ -94,7 +94,8 @@ def test_the_help_has_every_setting_under_its_heading(trdlab, kind):
         assert f"{name}: {about}" in told
         assert all(key in keys for key in lines)
     horizon = preset(kind, "X").horizon
-    assert f"--N <int> Number of explicit components; 0 is DQN. [default: ({horizon})]" in told
+    about = rf"Number of explicit components; 0 is DQN\. \[default: \({horizon}\)\]"
+    assert re.search(rf"--N (<int>|INTEGER) {about}", told)  # which of them, Typer decides
 
 
 @pytest.mark.parametrize("command", ["resume", "evaluate", "runs"])
@@ -176,13 +177,13 @@ def test_options_of_every_type_and_which_of_preset_file_and_option_wins(trdlab, 
         (["atari", "Brekout"], "no Atari game 'Brekout'. Did you mean 'Breakout'?"),
         (
             ["atari", "Pong", "--env-arg", "stiky=0.1"],
-            "no argument 'stiky'. Did you mean 'sticky'?",
+            "Atari games take no argument 'stiky'. Did you mean 'sticky'?",
         ),
         (["gym", "CartPole-v1", "--env-arg", "gravity"], "'gravity' is not KEY=VALUE."),
         (["gym", "CartPole-v1", "--preset", "clasic"], "Did you mean 'classic'?"),
         (["gym", "CartPole-v1", "--preset", "paper"], "no preset 'paper' for gym. Known: classic"),
         (["gym", "CartPole-v1", "--config", "none.toml"], "'none.toml' cannot be read"),
-        (["gym", "CartPole-v1", "--learning-rat", "1"], "No such option: --learning-rat (Possible"),
+        (["gym", "CartPole-v1", "--learning-rat", "1"], "No such option"),
         (["gym", "CartPole-v1", "--N", "2.5"], "Invalid value for '--N'"),
         (["gym", "CartPole-v1", "--N", "-1"], "The setting N is -1. It must be from 0 to 10,000."),
         (["gym", "CartPole-v1", "--gamma", "1"], "gamma is 1.0. It must be at least 0"),

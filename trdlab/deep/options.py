@@ -33,9 +33,9 @@ def option(
         least: of numbers, or of each element; without it, they are checked elsewhere.
         most: likewise.
     """
-    metadata = {"help": about, "panel": panel, "key": key, "metavar": metavar}
-    metadata |= {"kind": kind or type(default), "least": least, "most": most}
-    return field(default=default, metadata=metadata)
+    told: dict[str, Any] = {"help": about, "panel": panel, "key": key, "metavar": metavar}
+    told |= {"kind": kind or type(default), "least": least, "most": most}
+    return field(default=default, metadata=told)
 
 
 def check_range(of: Field[Any], value: Any) -> None:

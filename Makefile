@@ -31,7 +31,7 @@ docs: $(VENV)/installed-tests
 # They have wheels for Python 3.11 and 3.12.
 test-lowest: $(VENV)-lowest/installed
 	$(LOWEST_PIP) gymnasium==1.0.0
-	$(LOWEST_TESTS) -k "not atari" tests/gridworld tests/test_environments.py tests/test_evaluation.py tests/cli/test_gridworld.py \
+	$(LOWEST_TESTS) -k "not atari" tests/gridworld tests/environments tests/rollouts/test_evaluation.py tests/cli/test_gridworld.py \
 		tests/cli/test_train.py tests/deep/test_estimator.py tests/deep/test_networks.py tests/training/test_setup.py
 	$(LOWEST_PIP) gymnasium==1.1.0
 	$(LOWEST_TESTS) tests/atari tests/test_wrappers.py

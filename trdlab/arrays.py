@@ -1,5 +1,6 @@
-"""The array types that signatures name; shapes stand in the docstrings."""
+"""The array types that signatures name, trees of them, and when two numbers are the same one."""
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -8,3 +9,33 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.floating[Any]]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+
+RELATIVE_ZERO = 1e-12
+"""Two computed numbers closer than this, relative to the larger, are the same number."""
+
+
+def same(a: float, b: float) -> bool:
+    """Returns whether two computed numbers are the same up to rounding.
+
+    >>> same(0.1 + 0.2, 0.3), same(0.0, 1e-300)
+    (True, False)
+    """
+    return abs(a - b) <= RELATIVE_ZERO * max(abs(a), abs(b))
+
+
+def map_leaves(function: Callable[[Any], Any], tree: Any) -> Any:
+    """Returns a tree with a function applied to each of its arrays; None stays None.
+
+    Args:
+        function: from an array to anything.
+        tree: an array, None, or a dict, list or tuple of trees.
+
+    >>> map_leaves(lambda leaf: leaf[[1]], {"h": np.array([3, 4]), "c": (np.array([5, 6]), None)})
+    {'h': array([4]), 'c': (array([6]), None)}
+    """
+    if isinstance(tree, Mapping):
+        return {key: map_leaves(function, leaf) for key, leaf in tree.items()}
+    if isinstance(tree, list | tuple):
+        leaves = [map_leaves(function, leaf) for leaf in tree]
+        return leaves if isinstance(tree, list) else tuple(leaves)
+    return None if tree is None else function(tree)

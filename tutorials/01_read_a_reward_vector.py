@@ -20,11 +20,10 @@ from textwrap import fill
 from matplotlib import pyplot as plt
 
 from trdlab.decomposition import TimeAxis
-from trdlab.explain import explain, gridworld_moment
+from trdlab.explanations import explain, gridworld_moment, sentence
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.render import draw_map
-from trdlab.show import sentence
-from trdlab.show.plots import plot_components
+from trdlab.show.plots.moment import plot_components
 from trdlab.tabular import exact, undiscounted_totals
 
 from exercise import check

@@ -18,9 +18,9 @@ from trdlab.deep.estimator import NetworkEstimator
 from trdlab.deep.networks import build_network
 from trdlab.deep.settings import TrainSettings
 from trdlab.environments import GymEnvironments
-from trdlab.evaluation import evaluate
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.pixels import pictures
+from trdlab.rollouts.evaluation import evaluate
 from trdlab.tabular import exact
 from trdlab.training.machine import resolved
 from trdlab.training.setup import future, new_trainer

@@ -17,15 +17,18 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib import pyplot as plt
 
+from trdlab.agents import Agent
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explain import Agent, ModelEnvironments, assess, explain
+from trdlab.explanations import assess, explain, moment_at
+from trdlab.explanations.calibration.sentences import trust_sentences
+from trdlab.explanations.moment.sentences import sentence
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.show.sentences import sentence
-from trdlab.show.trust import plot_trust
-from trdlab.show.verdicts import trust_sentences
+from trdlab.policies import Memoryless
+from trdlab.show.plots.calibration import plot_trust
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 from exercise import check
 
@@ -208,7 +211,7 @@ def agent(name, table, axis):
         make=lambda count, seed: ModelEnvironments(
             model, count, seed=seed, time_limit=200
         ),
-        policy=lambda states: np.eye(4)[autopilot[states]],
+        policy=Memoryless(lambda states: np.eye(4)[autopilot[states]]),
     )
 
 
@@ -227,7 +230,7 @@ agents = {
 
 # %%
 for name, of in agents.items():
-    explanation = explain(of.moment(step=8))
+    explanation = explain(moment_at(of, step=8))
     print(f"{name}:")
     say(sentence(finding, explanation) for finding in explanation.forecast)
 

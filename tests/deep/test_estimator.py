@@ -11,7 +11,7 @@ from trdlab.deep.estimator import NetworkEstimator
 from trdlab.deep.networks import build_network
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
-from trdlab.explain import explain, moment_of
+from trdlab.explanations import explain, moment_of
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.wrappers import TemporalRewardDecomposition, VectorTemporalRewardDecomposition
 

@@ -223,7 +223,7 @@ def test_a_batch_that_does_not_fit_is_refused(changed, message):
     [
         ({"learning_rate": 0.0}, r"learning rate is 0\.0"),
         ({"learning_rate": float("nan")}, r"learning rate is nan"),
-        ({"target_sync_updates": 0}, r"target_sync_updates is 0"),
+        ({"target_sync_updates": 0}, r"target_sync_updates` is 0"),
         ({"reduction": "max"}, r"reduction is 'max'"),
         ({"precision": "bfloat"}, r"precision is 'bfloat'\. Use 'float32' or"),
     ],

@@ -6,20 +6,21 @@ from functools import cache
 
 import numpy as np
 import pytest
+from trdlab.explanations.explained import Explained, Part, parse_parts
+from trdlab.explanations.moment.sentences import UnsupportedSentenceError
+from trdlab.show.explained import check_explained, summary, to_dict
 
+from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain import Moment, assess, explain, explain_agent, gridworld_agent
-from trdlab.explain.explained import Explained, Part, parse_parts
-from trdlab.show.explained import check_explained, summary, to_dict
-from trdlab.show.explained_plots import (
+from trdlab.explanations import Moment, assess, explain, explain_agent
+from trdlab.show.plots.explained import (
     moment_figure,
     part_figure,
     picture_paths,
     trust_figure,
 )
-from trdlab.show.sentences import UnsupportedSentenceError
 
 
 @cache
@@ -56,7 +57,7 @@ def test_a_summary_answers_what_why_not_how_far_and_whose():
 def test_the_plain_data_has_the_numbers_and_their_sentences():
     found = explained(parts=("contrast", "calibration"), step=1)
     data = json.loads(json.dumps(to_dict(found), allow_nan=False))
-    assert data["schema"] == "trdlab.explain/1"
+    assert data["schema"] == "trdlab.explanations/1"
     assert data["time_axis"]["labels"] == ["t", "t+1", "t+2", "t+3", "t+4…∞"]
     moment, calibration = data["moment"], data["calibration"]
     assert (moment["seed"], moment["step"]) == (0, 1)
@@ -93,8 +94,8 @@ def test_bars_that_are_not_to_be_trusted_are_faded():
     explanation, report = found.explanation, found.report
     assert explanation is not None
     assert report is not None
-    trust = replace(report.trust, components=2, residual=True)
-    of_foils = replace(report.trust, components=3, residual=False)
+    trust = replace(report.trust, components=2, tested=2, residual=True)
+    of_foils = replace(report.trust, components=3, tested=3, residual=False)
     moment = replace(explanation.moment, trust=trust, foil_trust=of_foils)
     figure = moment_figure(replace(explanation, moment=moment), explanation.foil, "ledge")
     figure.canvas.draw()
@@ -125,7 +126,7 @@ def test_how_often_a_reward_came_is_drawn_where_there_is_one_amount():
     several = explained("ledge").report  # -1 and 1
     assert several is not None
     assert len(trust_figure(several, "ledge").axes) == 1
-    coin = assess(gridworld_agent("loop,slip=0.2", TimeAxis(0.95, 4)), episodes=40)
+    coin = assess(gridworld_agent("loop,slip=0.2", TimeAxis(0.95, 4)), episodes=120)
     skill, chance = trust_figure(coin, "loop").axes
     assert skill.get_ylabel().startswith("skill")
     assert chance.get_title() == "chance of the reward of 1"

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from trdlab.explanations.moment.explanation import explain
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explain.explanation import explain
-from trdlab.explain.moment import Moment, Uncertainty
-from trdlab.show.explained_plots import moment_figure
-from trdlab.show.plots import plot_components, plot_uncertainty, whiskers
+from trdlab.explanations.moment.moment import Moment, Uncertainty
+from trdlab.show.plots.explained import moment_figure
+from trdlab.show.plots.moment import plot_components, plot_uncertainty, whiskers
 
 LEARNED = Moment(
     RewardDecomposition(np.array([[0.1, 0.5, 0.2, 0.0], [0.3, 0.4, 0.2, 0.1]]), TimeAxis(0.9, 3)),

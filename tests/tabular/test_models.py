@@ -12,8 +12,7 @@ from gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv
 
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explain import explain, tabular_moment
-from trdlab.show import check, sentences
+from trdlab.explanations import check, explain, sentences, tabular_moment
 from trdlab.tabular import (
     MDP,
     exact,

@@ -51,7 +51,7 @@ def check_range(of: Field[Any], value: Any) -> None:
         if not least <= each <= most:  # nor is NaN
             wanted = f"{least} or more" if each < least else "less than 2**63"
             raise InputError(
-                f"The setting {of.metadata['key'] or of.name} is {each}.",
+                f"`{of.name}` is {each}.",
                 f"It must be {wanted if most == _LARGE else f'from {least} to {most:,}'}.",
             )
 

@@ -49,12 +49,12 @@ class UpdateSettings:
             raise InputError(f"The learning rate is {self.learning_rate}.", "Choose one above 0.")
         if self.target_sync_updates < 1:
             raise InputError(
-                f"target_sync_updates is {self.target_sync_updates}.",
+                f"`target_sync_updates` is {self.target_sync_updates}.",
                 "Copy the network every 1 or more updates.",
             )
         longest = self.max_grad_norm
         if longest is not None and not 0.0 < longest < float("inf"):
-            raise InputError(f"max_grad_norm is {longest}.", "Choose a length above 0.")
+            raise InputError(f"`max_grad_norm` is {longest}.", "Choose a length above 0.")
         for name, known in (
             ("loss", get_args(Loss)),
             ("reduction", get_args(Reduction)),
@@ -205,7 +205,7 @@ class TrainSettings:
         windows = self.width * self.num_envs
         if self.learning_starts < windows:
             raise InputError(
-                f"The setting learning_starts is {self.learning_starts}: not one window of "
+                f"`learning_starts` is {self.learning_starts}: not one window of "
                 f"w = {self.width} steps is full by then.",
                 f"Choose {windows} or more.",
             )
@@ -213,7 +213,7 @@ class TrainSettings:
             raise InputError(
                 f"A batch of {self.batch_size} windows is larger than a replay memory of "
                 f"{self.capacity} transitions.",
-                "Choose a smaller batch_size or a larger capacity.",
+                "Choose a smaller `batch_size` or a larger `capacity`.",
             )
 
     @property

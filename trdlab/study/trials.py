@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from trdlab.errors import InputError
-from trdlab.explain.contrast import in_short
-from trdlab.explain.explanation import Explanation, explain
-from trdlab.explain.finding import Finding
-from trdlab.explain.tabular import tabular_moment
+from trdlab.explanations.claims import Finding
+from trdlab.explanations.moment.contrast import in_short
+from trdlab.explanations.moment.exact import tabular_moment
+from trdlab.explanations.moment.explanation import Explanation, explain
+from trdlab.explanations.moment.sentences import check, sentence
 from trdlab.formatting import number
-from trdlab.show.sentences import check, sentence
 from trdlab.study.candidates import (
     CANDIDATES,
     LETTERS,
@@ -58,7 +58,7 @@ def draw_trials(seed: int, count: int = 12) -> tuple[Trial, ...]:
     """Returns trials in random order, equally many about each candidate.
 
     Each is about another state, drawn from the first half of an episode that the candidate plays:
-    later there is little left to expect. The text is what `trdlab.show.sentences` prints, less
+    later there is little left to expect. The text is what the sentences module prints, less
     what would give the map away: actions have other names in each trial, and what would change
     if a named source paid something else is left out.
 

@@ -49,7 +49,7 @@ def check_threads(settings: TrainSettings) -> None:
     processors = max(os.cpu_count() or 1, _cores())
     if settings.threads > processors:
         raise InputError(
-            f"The setting threads is {settings.threads}, and the machine has {processors} "
+            f"`threads` is {settings.threads}, and the machine has {processors} "
             f"processor{'' if processors == 1 else 's'}.",
             "Choose at most as many, or 0.",
         )

@@ -2,19 +2,18 @@
 
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import gymnasium as gym
 import numpy as np
 
 from trdlab.deep.presets import preset
 from trdlab.deep.settings import Kind, TrainSettings, checked
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
-from trdlab.environments.stack import observation_space
+from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.files import check_small_text
@@ -73,8 +72,16 @@ def make_environments(
         seed: what their seeds are drawn from; by default that of the run.
 
     Raises:
-        InputError: they cannot be made.
+        InputError: they cannot be made, or have more or fewer actions than the settings name.
     """
+    environments = _made(settings, num_envs, seed)
+    if settings.action_names:
+        named = Interface.of(environments).named(settings.action_names)
+        environments.action_names = named.action_names
+    return environments
+
+
+def _made(settings: TrainSettings, num_envs: int | None, seed: int | None) -> Environments:
     arguments = parse_arguments(settings.env_arg)
     count = settings.num_envs if num_envs is None else num_envs
     seed = settings.seed if seed is None else seed
@@ -95,45 +102,14 @@ def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer
     return Trainer(settings, environments)
 
 
-def describe(environments: Environments, action_names: Sequence[str] = ()) -> dict[str, Any]:
-    """Returns what must be known of environments to use their agent without them; plain data.
-
-    Args:
-        environments: which ones.
-        action_names: A names, where people call the actions otherwise than the environment.
-
-    Raises:
-        InputError: there are more or fewer names than actions.
-    """
-    if action_names and len(action_names) != environments.num_actions:
-        raise InputError(
-            f"There are {len(action_names)} names for {environments.num_actions} actions: "
-            f"{', '.join(action_names)}.",
-            "Give one for each action.",
-        )
-    space = observation_space(environments)
-    if isinstance(space, gym.spaces.Discrete):
-        seen: dict[str, Any] = {"states": int(space.n), "first_state": int(space.start)}
-    else:
-        seen = {"shape": list(space.shape or ()), "dtype": np.dtype(space.dtype).name}
+def describe(environments: Environments) -> dict[str, Any]:
+    """Returns what must be known of environments to use their agent without them; plain data."""
     return {
-        "observation": seen,
-        "num_actions": environments.num_actions,
-        "first_action": environments.first_action,
-        "action_names": list(action_names or environments.action_names),
+        **Interface.of(environments).to_dict(),
         "time_limit": environments.time_limit,
         "frame_skip": environments.frame_skip,
         "frames_per_second": environments.frames_per_second,
     }
-
-
-def described_space(observation: Mapping[str, Any]) -> gym.spaces.Space[Any]:
-    """Returns the observation space that `describe` wrote down (bounds are not kept)."""
-    if "states" in observation:
-        return gym.spaces.Discrete(observation["states"], start=observation["first_state"])
-    dtype = np.dtype(observation["dtype"])
-    low, high = (0, 255) if dtype == np.uint8 else (-np.inf, np.inf)
-    return gym.spaces.Box(low, high, tuple(observation["shape"]), dtype=dtype.type)
 
 
 def future(settings: TrainSettings) -> Future:
@@ -141,9 +117,7 @@ def future(settings: TrainSettings) -> Future:
     policy = "the greedy policy of the network"
     if settings.width > 1:
         policy += f" (for the first {settings.width} steps, the ε-greedy one it learned from)"
-    reward = "sign of each reward" if settings.clip_rewards else Future(policy).reward
-    ending = "a lost life, or the end of the game" if settings.life_loss_ends else "terminal states"
-    return Future(policy, reward, ending)
+    return Future(policy, settings.clip_rewards, settings.life_loss_ends)
 
 
 @dataclass(frozen=True)
@@ -179,7 +153,6 @@ def plan(settings: TrainSettings) -> Plan:
     environments = make_environments(settings)
     try:
         settings = resolved(settings, environments)
-        describe(environments, settings.action_names)  # refuses what a run would refuse
         warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
         begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)
         trainer = new_trainer(begun, environments)

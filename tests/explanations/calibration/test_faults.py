@@ -1,0 +1,183 @@
+"""Planted faults are named, each by its name; healthy estimators raise none."""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from by_hand import Given, episode
+from trdlab.arrays import FloatArray
+from trdlab.bellman import target
+from trdlab.decomposition import TimeAxis
+from trdlab.errors import InputError
+from trdlab.estimator import Future
+from trdlab.explanations.calibration.consistency import Consistency, consistency_of
+from trdlab.explanations.calibration.faults import discount_exponent, faults, is_discount_wrong
+from trdlab.explanations.calibration.report import judge
+from trdlab.explanations.rules import Claim
+from trdlab.gridworld import Gridworld, load_map
+from trdlab.policies import Memoryless
+from trdlab.rollouts.episodes import Episode, collect
+from trdlab.tabular import MDP, exact, learn
+from trdlab.tabular.episodes import ModelEnvironments
+
+SINGLE, PAIRS = TimeAxis(0.95, 12), TimeAxis(0.95, 6, 2)
+GREEDY = Future("the greedy policy")
+WORLDS = ("drone", "windy")
+
+
+@cache
+def world(name: str) -> MDP:
+    return Gridworld(load_map(name).with_slip(0.2)).mdp
+
+
+def played(name: str, components: FloatArray, axis: TimeAxis, seed: int, num: int = 200) -> Any:
+    """Plays the greedy policy of some components, whatever is wrong with them."""
+    environments = ModelEnvironments(world(name), num, seed=seed, time_limit=200)
+    return collect(Given(components, axis, GREEDY), environments, seed=seed)
+
+
+def diagnosed(episodes: tuple[Episode, ...]) -> list[Claim]:
+    return faults(judge(GREEDY, episodes))
+
+
+@cache
+def early(mdp: MDP) -> tuple[FloatArray, FloatArray]:
+    """A policy, and components of a learner that took R_(t+1) for R_t while evaluating it."""
+    table = exact(mdp, replace(SINGLE, horizon=SINGLE.horizon + 1))
+    return table.solution.policy, table.decomposition.components[..., 1:] / SINGLE.gamma
+
+
+@cache
+def unpowered(name: str) -> FloatArray:
+    """Components whose learner discounts groups of two steps by γ, not γ²."""
+    mdp, axis = world(name), PAIRS
+    states = np.arange(mdp.num_states)
+    components = np.zeros((*mdp.shape, axis.num_components))
+    for _ in range(300):
+        actions = components.sum(axis=2).argmax(axis=1)
+        own = mdp.expected_rewards
+        rewards = own + axis.gamma * mdp.expect(own[states, actions])
+        following = components[states, actions].T
+        later = [mdp.expect(mdp.expect(part)[states, actions]) for part in following]
+        components = target(rewards, axis.gamma, np.stack(later, axis=-1))
+    return components
+
+
+@cache
+def endless(name: str, axis: TimeAxis) -> FloatArray:
+    """Components whose learner goes on in the next episode where one ends."""
+    mdp = world(name)
+    following = np.where(mdp.terminated, mdp.start, mdp.next_states)
+    goes_on = replace(mdp, next_states=following, terminated=np.zeros_like(mdp.terminated))
+    return exact(goes_on, axis).decomposition.components
+
+
+@cache
+def healthy(name: str, axis: TimeAxis) -> FloatArray:
+    return exact(world(name), axis).decomposition.components
+
+
+@cache
+def learned(name: str) -> FloatArray:
+    return learn(world(name), SINGLE, agent_steps=200_000, seed=3).decomposition.components
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_healthy_estimator_raises_no_alarm(name: str, seed: int):
+    for axis in (SINGLE, PAIRS):
+        assert diagnosed(played(name, healthy(name, axis), axis, seed)) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_estimator_that_has_learned_raises_no_alarm(seed: int):
+    assert diagnosed(played("bridge", learned("bridge"), SINGLE, seed)) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", [*WORLDS, "loop"])
+def test_a_reward_shifted_by_one_step_is_named(name: str, seed: int):
+    policy, components = early(world(name))
+    episodes = collect(
+        Given(components, SINGLE, GREEDY),
+        ModelEnvironments(world(name), 200, seed=seed, time_limit=100),
+        policy=Memoryless(lambda states: policy[states]),
+        seed=seed,
+    )
+    (fault,) = diagnosed(episodes)
+    assert (fault.kind, fault.steps) == ("too-early", 1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_forgotten_power_of_gamma_is_named(name: str, seed: int):
+    (fault,) = diagnosed(played(name, unpowered(name), PAIRS, seed, num=500))
+    assert fault.kind == "discount-off"
+    assert fault.right == pytest.approx(0.95**2)
+    assert fault.measured == pytest.approx(0.95, abs=0.025)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", WORLDS)
+def test_an_ignored_end_is_named(name: str, seed: int):
+    for axis in (SINGLE, PAIRS):
+        (fault,) = diagnosed(played(name, endless(name, axis), axis, seed))
+        assert fault.kind in ("goes-on-in-next", "goes-on-after-end")
+        assert fault.share == pytest.approx(1.0, abs=0.2)
+
+
+def test_what_is_expected_after_the_end_itself_is_seen():
+    # the learner bootstraps from last observations, of which it always expects 1 in two steps
+    mdp, axis = world("bridge"), SINGLE
+    junk = np.zeros(axis.num_components)
+    junk[2] = 1.0
+    ends = mdp.per_action(mdp.probabilities * mdp.terminated)  # [S, A]
+    components, states = healthy("bridge", axis).copy(), np.arange(mdp.num_states)
+    for _ in range(300):
+        actions = components.sum(axis=2).argmax(axis=1)
+        later = np.stack([mdp.expect(part) for part in components[states, actions].T], axis=-1)
+        components = target(mdp.expected_rewards, axis.gamma, later + ends[..., None] * junk)
+    components[mdp.terminal_states] = junk
+    (fault,) = diagnosed(played("bridge", components, axis, 0))
+    assert fault.kind == "goes-on-after-end"
+
+
+# ---- the audit -----------------------------------------------------------------------------------
+
+
+def predicted(rows: list[list[float]], axis: TimeAxis, **changes: Any) -> Episode:
+    """An episode without a reward, by what was expected at every observation."""
+    return episode([0.0] * (len(rows) - 1), axis, rows, **changes)
+
+
+def test_the_gap_between_steps_by_hand():
+    axis = TimeAxis(0.5, 2)
+    found = consistency_of([predicted([[1.0, 2.0, 3.0], [4.0, 1.0, 1.0], [9.0, 9.0, 9.0]], axis)])
+    assert (found.num_transitions, found.num_ends) == (2, 1)
+    # step 0: 2 − ½·4 and 3 − ½·(1 + 1); step 1 ended, so 1 and 1 should be nothing
+    assert found.gap.value.tolist() == [0.5, 1.5]
+
+
+def test_pairs_leave_out_what_random_actions_and_truncations_hide():
+    axis = TimeAxis(0.5, 1, 2)
+    rows = [[1.0, 1.0]] * 7  # six steps and the last observation
+    cut = {"terminated": False, "ends": np.zeros(6, dtype=np.bool_)}
+    assert consistency_of([predicted(rows, axis)]).num_transitions == 6
+    assert consistency_of([predicted(rows, axis, **cut)]).num_transitions == 5  # one reaches beyond
+    assert consistency_of([predicted(rows, axis, **cut)]).num_ends == 0
+    random = np.array([False, False, True, False, False, False, False, False])
+    assert consistency_of([predicted(rows, axis, random=random)]).num_transitions == 5
+    assert consistency_of([predicted(rows, axis, time_limit=6)]).num_transitions == 5
+    with pytest.raises(InputError, match="0 pairs of steps"):
+        consistency_of(
+            [predicted(rows[:2], axis, terminated=False, ends=np.zeros(1, dtype=np.bool_))]
+        )
+
+
+def test_an_audit_that_says_nothing_names_nothing():
+    silent: Consistency = consistency_of([predicted([[0.0, 0.0]] * 4, TimeAxis(0.5, 1))] * 12)
+    assert np.isnan(discount_exponent(silent).value)
+    assert not is_discount_wrong(silent)

@@ -1,0 +1,112 @@
+"""The agent that is explained: an estimator, the policy it describes, and where it acts."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from trdlab.agents.models import World
+from trdlab.agents.places import Origin
+from trdlab.environments.batches import Make, in_batches
+from trdlab.environments.interface import Interface
+from trdlab.estimator import Estimator
+from trdlab.policies import Policy
+from trdlab.rollouts.branches import Copying
+from trdlab.rollouts.episodes import Episode, Recording
+from trdlab.rollouts.playing import Progress, Watch, unwatched
+
+
+@dataclass(frozen=True, eq=False)
+class Agent:
+    """Who acts, where, and what it expects.
+
+    Args:
+        name: what people call it.
+        estimator: what it expects.
+        action_names: A names.
+        make: makes the environments that it acts in, from their number and a seed.
+        policy: who acts, where that is not the estimator's greedy policy.
+        world: the model that the estimator is the exact table of; None if it was learned.
+        seconds_per_step: how long one of its steps takes as people play, if that is known.
+        origin: how a user has named it, and where it acts; None if it was given as an object.
+        copying: how much is copied of its states, where nothing else is said.
+    """
+
+    name: str
+    estimator: Estimator
+    action_names: tuple[str, ...]
+    make: Make
+    policy: Policy | None = None
+    world: World | None = None
+    seconds_per_step: float | None = None
+    origin: Origin | None = None
+    copying: Copying = Copying()  # noqa: RUF009  it is frozen
+
+    @cached_property
+    def interface(self) -> Interface:
+        """What it sees and does, by the names that it has for that."""
+        environments = self.make(1, 0)
+        try:
+            found = Interface.of(environments)
+        finally:
+            environments.close()
+        return replace(found, action_names=self.action_names)
+
+    @contextmanager
+    def begin(self, *, seed: int, **how: Any) -> Iterator[Recording]:
+        """Begins an episode of the agent, to be played and paused as one likes.
+
+        Args:
+            seed: of the environment, and of the actions.
+            how: as for `Recording`.
+        """
+        environments = self.make(1, seed)
+        try:
+            yield Recording(self.estimator, environments, policy=self.policy, seed=seed, **how)
+        finally:
+            environments.close()
+
+    def play(
+        self,
+        count: int,
+        *,
+        seed: int,
+        watch: Watch = unwatched,
+        what: str = "episodes",
+        **how: Any,
+    ) -> tuple[Episode, ...]:
+        """Returns whole episodes that the agent plays, each in an environment of its own.
+
+        They are played one after another where only one environment can be there at a time.
+
+        Args:
+            count: of the episodes.
+            seed: of the environments, and of the actions.
+            watch: told how far they are, after every step.
+            what: they are called then.
+            how: as for `Recording`.
+        """
+        played: tuple[Episode, ...] = ()
+
+        def tell(progress: Progress) -> None:
+            watch(replace(progress, finished=len(played) + progress.finished, episodes=count))
+
+        for batch, environments in enumerate(in_batches(self.make, count, seed)):
+            own = seed if batch == 0 else _mixed(seed, batch)
+            recording = Recording(self.estimator, environments, policy=self.policy, seed=own, **how)
+            recording.play(watch=tell, what=what)
+            played += recording.episodes()
+        return played
+
+    def action(self, name: str) -> str:
+        """Returns the name of an action that is given by its name or its number."""
+        known = self.action_names
+        is_number = name not in known and name.isdecimal() and int(name) < len(known)
+        return known[int(name)] if is_number else name
+
+
+def _mixed(seed: int, batch: int) -> int:
+    return int(np.random.SeedSequence([seed, batch]).generate_state(1)[0])

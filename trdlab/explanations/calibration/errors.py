@@ -1,0 +1,164 @@
+"""Errors of a forecast: what is wrong with its timing, its amount, its sharpness."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.decomposition import TimeAxis
+from trdlab.errors import InputError
+from trdlab.rollouts.realised import Samples
+from trdlab.statistics import Estimate, by_episode, draws, has_enough, pooled
+
+LARGEST_SHIFT = 10
+AGREEMENT = 0.99
+"""The share of bootstrap samples in which a shift must be the best one, to be blamed."""
+MIN_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25
+"""Below this the discount of a component cannot be taken out of it again."""
+LEAST_SMEAR = 0.05
+"""Less than this is not blamed."""
+SLACK = 0.1
+"""How far from 1 an amount may be, before it is blamed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """What would mend a forecast.
+
+    Rewards are compared undiscounted, each group as seen from its own start, so that a component
+    can stand in for its neighbour. One repair follows another: components are moved by `shift`
+    places, divided by `amount` if that `is_off`, and then `smear` is looked for.
+
+    Args:
+        time_axis: what the components mean.
+        shift: by how many components rewards are predicted too late; negative if too early. It is
+            0 unless another one is the best in nearly all bootstrap samples.
+        agreement: the share of bootstrap samples in which the best shift is the best.
+        amount: how many times as much is predicted as comes, of all explicit components together.
+            NaN where nothing came.
+        smear: x, where p + x·(2p − p₋ − p₊) is the best prediction that can be had from p and its
+            neighbours p₋ and p₊. Above 0, rewards are smeared over neighbouring components; below,
+            there is noise that differs between neighbours. A prediction that is rightly unsure of
+            the timing has 0.
+    """
+
+    time_axis: TimeAxis
+    shift: int
+    agreement: float
+    amount: Estimate
+    smear: Estimate
+
+
+def is_off(amount: Estimate) -> bool:
+    """Returns whether an amount is surely wrong by more than a tenth, and not in its sign."""
+    return 0.0 <= amount.high < 1.0 - SLACK or amount.low > 1.0 + SLACK
+
+
+def errors_of(samples: Samples, *, seed: int = 0) -> Errors:
+    """Returns what is wrong with the timing, the amount and the sharpness of a forecast.
+
+    Args:
+        samples: predictions and what followed them.
+        seed: of the bootstrap, which is by episode.
+
+    Raises:
+        InputError: there are fewer than 2 explicit components, or their discounts vanish.
+    """
+    axis = samples.time_axis
+    if axis.horizon < 2 or axis.discounts[-2] < MIN_DISCOUNT:
+        raise InputError(
+            f"Components of {axis} cannot stand in for each other.",
+            "Decompose with N of at least 2, and γ above 0.",
+        )
+    known = samples.known[:, :-1]  # [M, N]
+    p, o = (of[:, :-1] / axis.discounts[:-1] for of in (samples.predicted, samples.observed))
+    best, agreement = _best_shift(samples, p, o, seed)
+    is_sure = agreement >= AGREEMENT and not _spoils(samples, p, o, best, seed)
+    shift = best if is_sure else 0
+    here = np.arange(max(0, -shift), min(axis.horizon, axis.horizon - shift))  # [K], in range
+    known = known[:, here]
+    p, o = (np.where(known, of, 0.0) for of in (p[:, here + shift], o[:, here]))
+    amount = _amount(samples, p, o, axis.discounts[here], seed)
+    scaled = p / amount.value if is_off(amount) and amount.value else p
+    smear = _smear(samples, np.where(known, _bend(scaled), 0.0), o - scaled, seed)
+    return Errors(axis, shift, agreement, amount, smear)
+
+
+def _best_shift(samples: Samples, p: FloatArray, o: FloatArray, seed: int) -> tuple[int, float]:
+    """Returns the shift at which p and o correlate best, and how surely it is the best.
+
+    Both are `[M, N]`, and counted from the mean of each component: that much is predicted at some
+    steps, and much comes at some, is not yet timing. A shift s takes p_(k+s) for what o_k is said
+    to be, and has to do better than no shift as seen from both.
+    """
+    horizon, known = p.shape[1], samples.known[:, :-1]
+    reach = min(LARGEST_SHIFT, horizon // 2)
+    p = p - p.mean(axis=0)
+    o = known * (o - _mean(o, known))
+    shifts, parts = np.arange(-reach, reach + 1), []
+    for shift in shifts:
+        for of_p, of_o in _places(shift, horizon):
+            a, b = p[:, of_p] * known[:, of_o], o[:, of_o]
+            parts += [np.einsum("mk,mk->m", *pair) for pair in ((a, b), (a, a), (b, b))]
+    rows = np.stack(parts, axis=1).reshape(len(p), len(shifts), 3, 3)
+    sums = samples.per_episode(rows)  # [E, shifts, 3, 3]
+    ab, aa, bb = np.moveaxis(pooled(draws(len(sums), seed), sums), -1, 0)  # [1 + R, shifts, 3]
+    size = aa * bb
+    cosine = np.where(size > 0.0, ab / np.sqrt(np.where(size > 0.0, size, 1.0)), 0.0)
+    gains = cosine[..., 0] - cosine[..., 1:].max(axis=-1)  # [1 + R, shifts]
+    gains[:, reach] = 1e-9  # no shift at all is the best where others gain nothing
+    best, *others = gains.argmax(axis=1)
+    return int(shifts[best]), float(np.mean(others == best)) if has_enough(sums) else float("nan")
+
+
+def _spoils(samples: Samples, p: FloatArray, o: FloatArray, shift: int, seed: int) -> bool:
+    """Returns whether a shift surely spoils some component.
+
+    Near components that are right, and far ones that were never learned, can look as if all rewards
+    were expected too early; but then the near ones fit best where they are. A component is spoiled
+    if its error becomes larger by a tenth of the error of constant guesses, on average over all.
+    """
+    known, places = samples.known[:, :-1], _places(shift, p.shape[1])
+    moved, *still = (known[:, of_o] * (p[:, of_p] - o[:, of_o]) ** 2 for of_p, of_o in places)
+    more = samples.per_episode(np.concatenate([moved - error for error in still], axis=1))
+    guess = (known * (o - _mean(o, known)) ** 2).sum() / p.shape[1]
+    return bool((by_episode(more, lambda of: of, seed=seed).low > SLACK * guess).any())
+
+
+def _mean(o: FloatArray, known: BoolArray) -> FloatArray:
+    """Returns `[N]`: the mean of `o [M, N]`, which is 0 where it is not known."""
+    return np.asarray(o.sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+
+
+def _places(shift: int, horizon: int) -> list[tuple[IntArray, IntArray]]:
+    """Returns the components of p, and those of o, that are compared: moved by a shift, and not.
+
+    Those that are not moved are the same of o, and the same of p.
+    """
+    k = np.arange(max(0, -shift), min(horizon, horizon - shift))
+    return [(k + shift, k), (k, k), (k + shift, k + shift)]
+
+
+def _amount(
+    samples: Samples, p: FloatArray, o: FloatArray, discounts: FloatArray, seed: int
+) -> Estimate:
+    """Returns Σp̄ / Σō over components `[M, K]`, each counted by the sign of its ō."""
+    weights = discounts * np.sign(o.sum(axis=0))
+    sums = samples.per_episode(np.column_stack([p @ weights, o @ weights]))  # [E, 2]
+    return by_episode(
+        sums, lambda of: np.where(of[:, 1] > 0.0, of[:, 0] / of[:, 1], np.nan), seed=seed
+    )[()]
+
+
+def _smear(samples: Samples, bend: FloatArray, missed: FloatArray, seed: int) -> Estimate:
+    """Returns x of the best `missed` = x·`bend`, over all components and samples `[M, K]`."""
+    pairs = ((bend, missed), (bend, bend))
+    products = np.stack([np.einsum("mk,mk->m", *pair) for pair in pairs], axis=1)  # [M, 2]
+    return by_episode(samples.per_episode(products), lambda of: of[:, 0] / of[:, 1], seed=seed)[()]
+
+
+def _bend(p: FloatArray) -> FloatArray:
+    """Returns `[M, K]`: 2p − p₋ − p₊, and 0 where a neighbour is missing."""
+    bend = np.zeros_like(p)
+    bend[:, 1:-1] = 2.0 * p[:, 1:-1] - p[:, :-2] - p[:, 2:]
+    return bend

@@ -1,0 +1,244 @@
+"""The states that two agents came to, and what each of them expects there."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from hashlib import blake2b
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trdlab.agents.agent import Agent
+from trdlab.arrays import FloatArray, IntArray
+from trdlab.decomposition import TimeAxis
+from trdlab.policies import acting, ask, greedy
+from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
+
+_ROUNDING = 1e-9  # of the largest component; what differs by less is the same
+_BATCH = 256
+_PHASES = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class Visits:
+    """What two estimators expect at the same M states, on one time axis.
+
+    Args:
+        time_axis: what the components mean.
+        components: `[2, M, A, N+1]`, in discounted reward.
+        probabilities: `[2, M, A]`, of each action under the policy of each.
+        player: `[M]`, 0 or 1: in whose episode the state is.
+        seed: `[M]`, of that episode.
+        step: `[M]`, how many steps had been taken in it.
+        different: how many different episodes the states are from.
+        cut: how many episodes were not played to their end.
+    """
+
+    time_axis: TimeAxis
+    components: FloatArray
+    probabilities: FloatArray
+    player: IntArray
+    seed: IntArray
+    step: IntArray
+    different: int
+    cut: int = 0
+
+    def __len__(self) -> int:
+        return len(self.player)
+
+    @cached_property
+    def expected(self) -> FloatArray:
+        """`[2, M, N+1]`: what each expects of what it would do itself."""
+        return np.asarray((self.probabilities[..., None, :] @ self.components)[..., 0, :])
+
+    @cached_property
+    def actions(self) -> IntArray:
+        """`[2, M]`: what each would most likely do."""
+        return np.asarray(self.probabilities.argmax(axis=-1))
+
+    @cached_property
+    def difference(self) -> FloatArray:
+        """`[M, N+1]`: the second's expectation minus the first's, each of its own action."""
+        return self._without_rounding(self.expected[1] - self.expected[0])
+
+    @cached_property
+    def of_any_action(self) -> FloatArray:
+        """`[M, A, N+1]`: second minus first, of the same action."""
+        return self._without_rounding(self.components[1] - self.components[0])
+
+    @cached_property
+    def apart(self) -> FloatArray:
+        """`[M]`: how far apart the two are, over all components of what each would do."""
+        return np.asarray(np.abs(self.difference).sum(axis=-1))
+
+    def furthest(self, count: int) -> list[int]:
+        """Returns the states at which the two are furthest apart, no two of them much alike.
+
+        Alike are two whose differences are closer to each other than half of the smaller one.
+        """
+        found: list[int] = []
+        for m in np.argsort(-self.apart, kind="stable"):
+            if len(found) == count or not self.apart[m]:
+                break
+            closest = (
+                np.abs(self.difference[found] - self.difference[m]).sum(axis=-1).min(initial=np.inf)
+            )
+            if closest > 0.5 * self.apart[m]:
+                found.append(int(m))
+        return found
+
+    @cached_property
+    def least(self) -> float:
+        """The least difference that is more than rounding."""
+        return _ROUNDING * float(np.abs(self.components).max(initial=0.0))
+
+    def _without_rounding(self, difference: FloatArray) -> FloatArray:
+        return np.where(np.abs(difference) <= self.least, 0.0, difference)
+
+
+def visit(
+    players: tuple[Agent, Agent],
+    *,
+    episodes: int,
+    seed: int = 0,
+    most_states: int,
+    max_steps: int | None = None,
+    watch: Watch = unwatched,
+) -> Visits:
+    """Plays episodes of two agents, and asks both what they expect at the states of them all.
+
+    As many states are kept of the one's episodes as of the other's: who gets stuck and goes on and
+    on would else have the say.
+
+    Args:
+        players: the two; they see and do the same.
+        episodes: how many each plays, with the seeds from `seed` on.
+        seed: of the first episode, and of the choice of states.
+        most_states: how many states are kept at most, evenly spaced over all episodes.
+        max_steps: after which an episode is cut off, if not before.
+        watch: told how far the episodes are, after every step.
+    """
+    rng, different, cut = np.random.default_rng(seed), set(), 0
+    kept = _Kept(most_states // 2), _Kept(most_states // 2)
+    for player in range(2):
+        for own in range(seed, seed + episodes):
+            done, phase = player * episodes + own - seed, int(rng.integers(_PHASES))
+            told = blake2b()
+            for seen, happened, is_cut in _played(players, player, own, max_steps):
+                kept[player].offer(phase + seen.step, seen)
+                told.update(seen.observation.tobytes() + happened)
+                cut += is_cut
+                watch(Progress("episodes to compare at", done, 2 * episodes, seen.step))
+            different.add(told.digest())
+    count = min(len(of.found) for of in kept)
+    found = [item for of in kept for item in of.evenly(count)]
+    return replace(_visits(players, found, len(different)), cut=cut)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """An observation, where it was made, and what the two would do there.
+
+    Args:
+        player: in whose episode.
+        seed: of that episode.
+        step: of that episode.
+        observation: `[...]`.
+        probabilities: of each of the two, `[1, A]`; None of an onlooker who acts greedily, whom one
+            can ask later.
+    """
+
+    player: int
+    seed: int
+    step: int
+    observation: NDArray[Any]
+    probabilities: tuple[FloatArray | None, FloatArray | None]
+
+
+class _Kept:
+    """Observations, evenly spaced over all that were offered: every 2^k-th of each episode."""
+
+    def __init__(self, most: int) -> None:
+        self.most, self.every = most, 1
+        self.found: list[tuple[int, _Seen]] = []
+
+    def offer(self, tick: int, seen: _Seen) -> None:
+        if tick % self.every == 0:
+            self.found.append((tick, seen))
+        if len(self.found) > self.most:
+            self.every *= 2
+            self.found = [(tick, seen) for tick, seen in self.found if tick % self.every == 0]
+
+    def evenly(self, count: int) -> list[_Seen]:
+        """Returns so many of them, evenly spaced."""
+        which = np.linspace(0, len(self.found) - 1, count).round().astype(np.int64)
+        return [self.found[i][1] for i in which]
+
+
+def _played(
+    players: tuple[Agent, Agent], player: int, seed: int, max_steps: int | None
+) -> Iterator[tuple[_Seen, bytes, bool]]:
+    """Plays one episode just as it is explained, so that each of its steps can be.
+
+    Each of the two is asked at every step, for either may remember what came before.
+
+    Args:
+        players: the two.
+        player: 0 or 1, who of them acts.
+        seed: of the episode.
+        max_steps: after which it is cut off.
+
+    Yields:
+        What was seen at each step, what was done and paid, and whether more could have come of an
+        episode that is not played on.
+    """
+    agent, other = players[player], players[1 - player].policy
+    environments, rng, memory = agent.make(1, seed), np.random.default_rng(seed), None
+    try:
+        policy = acting(agent.policy or agent.estimator)
+        playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
+        while playing.running[0]:
+            at, observation = playing.steps, np.array(playing.stack.observations)  # [1, ...]
+            turn, likely = playing.turn(), None
+            if other is not None:
+                likely, memory = ask(other, observation, memory, np.array([at == 0]))
+            told = (turn.probabilities, likely)  # [1, A] each
+            seen = _Seen(player, seed, at, observation[0], told if player == 0 else told[::-1])
+            step = playing.take(turn.actions)
+            is_cut = bool(playing.finished[0] and not step.ended[0])
+            yield seen, turn.actions.tobytes() + step.rewards.tobytes(), is_cut
+    finally:
+        environments.close()
+
+
+def _visits(players: tuple[Agent, Agent], found: Sequence[_Seen], different: int) -> Visits:
+    axis = players[0].estimator.time_axis.shared(players[1].estimator.time_axis)
+    told = [_decided(agent, i, found, axis) for i, agent in enumerate(players)]
+    return Visits(
+        time_axis=axis,
+        components=np.stack([components for components, _ in told]),
+        probabilities=np.stack([probabilities for _, probabilities in told]),
+        player=np.array([seen.player for seen in found]),
+        seed=np.array([seen.seed for seen in found]),
+        step=np.array([seen.step for seen in found]),
+        different=different,
+    )
+
+
+def _decided(
+    agent: Agent, number: int, found: Sequence[_Seen], axis: TimeAxis
+) -> tuple[FloatArray, FloatArray]:
+    """Returns components `[M, A, N+1]` on an axis, and probabilities `[M, A]`."""
+    batches = [
+        agent.estimator.decompose(np.stack([seen.observation for seen in found[i : i + _BATCH]]))
+        for i in range(0, len(found), _BATCH)
+    ]
+    told = [seen.probabilities[number] for seen in found]
+    likely = (
+        np.concatenate([greedy(batch.value) for batch in batches])
+        if agent.policy is None
+        else np.concatenate([row for row in told if row is not None])
+    )
+    components = np.concatenate([batch.on(axis).components for batch in batches])
+    return components.astype(np.float64), likely.astype(np.float64)

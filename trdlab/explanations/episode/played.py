@@ -1,0 +1,88 @@
+"""An episode that was played, and how what is said of one looks."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from trdlab.agents.agent import Agent
+from trdlab.explanations.episode.revision import Revision, revise
+from trdlab.explanations.rules import Form, Language
+from trdlab.explanations.words import forms_of
+from trdlab.formatting import said
+from trdlab.rollouts.episodes import Episode
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """An episode with all that a story of it is held against.
+
+    Args:
+        episode: what was predicted and what happened.
+        action_names: A names.
+        seconds_per_step: how long a step takes as people play, if that is known.
+        revision: what each step changed; it follows from the episode.
+    """
+
+    episode: Episode
+    action_names: tuple[str, ...]
+    seconds_per_step: float | None = None
+    revision: Revision = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "revision", revise(self.episode))
+
+    @property
+    def scale(self) -> float:
+        """The largest reward that came, or value that was expected, whatever its sign."""
+        episode = self.episode
+        values = (episode.predicted.sum(axis=1), episode.expected.sum(axis=1), episode.rewards)
+        return float(max(np.abs(of).max() for of in values))
+
+    def action(self, step: int) -> str:
+        """Returns the name of the action taken at a step."""
+        return self.action_names[int(self.episode.actions[step])]
+
+    def row(self, step: int) -> int | None:
+        """Returns the place of a step in the revision, None if it has none."""
+        steps = self.revision.steps
+        place = int(np.searchsorted(steps, step))
+        return place if place < len(steps) and steps[place] == step else None
+
+
+def _forms(played: Played) -> dict[str, Form]:
+    axis = played.episode.time_axis
+    plural = axis.width > 1
+    return forms_of(axis, played.seconds_per_step) | {
+        "rewards": Form(lambda worth, digits: _named(worth, digits, plural=True), abs),
+        "paid": Form(lambda paid, digits: _named(paid, digits, plural=plural), abs),
+        "bound": Form(lambda most, _: said(_rounded_up(most))),
+    }
+
+
+def _named(value: float, digits: int, *, plural: bool) -> str:
+    """Returns a reward or a cost, or the worth of several."""
+    kind, size = "reward" if value >= 0.0 else "cost", said(abs(value), digits)
+    return f"{kind}s worth {size}" if plural else f"a {kind} of {size}"
+
+
+def _rounded_up(value: float) -> float:
+    """Returns a number of three digits that is no smaller."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.ceil(value / unit - 1e-9) * unit
+
+
+EPISODES = Language[Played]("this episode", _forms)
+"""What there is to say of an episode."""
+
+
+def play(agent: Agent, seed: int = 0, *, max_steps: int | None = None) -> Played:
+    """Returns an episode that an agent's policy plays, without any random actions of ours.
+
+    Args:
+        agent: who plays.
+        seed: of the episode.
+        max_steps: after which it is cut off, if not before.
+    """
+    (episode,) = agent.play(1, seed=seed, max_steps=max_steps)
+    return Played(episode, agent.action_names, agent.seconds_per_step)

@@ -1,0 +1,209 @@
+"""Rewards that came as foreseen, and promises that were not kept."""
+
+from collections.abc import Iterator
+from itertools import groupby
+
+import numpy as np
+
+from trdlab.arrays import IntArray
+from trdlab.explanations.episode.played import EPISODES, Played
+from trdlab.explanations.rules import Claim, Fields, every
+from trdlab.rollouts.episodes import Episode
+from trdlab.rollouts.realised import next_flag
+
+HALF = 0.5
+"""The share of a reward that counts as it, where it is expected and where it comes."""
+LEAST_SPAN = 6
+"""A promise is not called broken after fewer steps than this: chance can delay a reward."""
+SMALLEST_DISCOUNT = 1e-6
+"""A discount smaller than this is not taken out of a component."""
+
+
+# ---- rewards that came as foreseen -------------------------------------------------------------
+
+
+def foreseen(played: Played) -> list[Claim]:
+    """Returns the rewards that were foreseen, largest first, of equals the longest foreseen first.
+
+    There is none where the reward was always the same: then nothing had to be foreseen.
+    """
+    claims = every(played, foreseen_fully, foreseen_before)
+    return sorted(claims, key=lambda claim: (-abs(claim.reward), -claim.steps, claim.step))
+
+
+def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: object) -> bool:
+    """Returns whether half of a reward was expected of the right component for so many steps.
+
+    The right component of j steps before is the one that covers the step t + j. None is expected
+    across an end, nor of the residual. At the step before these it was not, or could not be.
+    """
+    episode, told = played.episode, range(steps + 1)
+    is_told = all(_can_tell(episode, step, j) and _tells(episode, step, j) for j in told)
+    could = _can_tell(episode, step, steps + 1)
+    return is_told and not (could and _tells(episode, step, steps + 1))
+
+
+@EPISODES.rule(
+    "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as it could be.",
+    holds=_is_foreseen,
+)
+def foreseen_fully(played: Played) -> Iterator[Fields]:
+    """It was foreseen since the future began, or as far ahead as there are explicit components."""
+    yield from (fields for fields in _foreseen(played) if fields["steps"] == fields["limit"])
+
+
+@EPISODES.rule(
+    "{reward:paid} at {step:step} was foreseen {steps:steps} before.", holds=_is_foreseen
+)
+def foreseen_before(played: Played) -> Iterator[Fields]:
+    """It was not foreseen any earlier, although it could have been."""
+    yield from (fields for fields in _foreseen(played) if fields["steps"] < fields["limit"])
+
+
+def _foreseen(played: Played) -> Iterator[Fields]:
+    episode, rewards = played.episode, played.episode.rewards
+    if np.ptp(rewards) == 0.0:
+        return
+    steps, limit = _foreseen_steps(episode)  # [T] each
+    for at in np.flatnonzero((steps >= 1) & (rewards != 0.0)).tolist():
+        told = {"reward": float(rewards[at]), "step": at, "steps": int(steps[at])}
+        yield told | {"limit": int(limit[at])}
+
+
+def _can_tell(episode: Episode, step: int, ahead: int) -> bool:
+    """Returns whether a reward could be told of so many steps ahead."""
+    began = step - ahead
+    in_sight = began >= 0 and ahead < episode.time_axis.num_steps
+    return in_sight and not episode.ends[began:step].any()
+
+
+def _tells(episode: Episode, step: int, ahead: int) -> bool:
+    """Returns whether half of a reward was expected so many steps ahead."""
+    axis, reward = episode.time_axis, episode.rewards[step]
+    expected = episode.predicted[step - ahead, ahead // axis.width] * np.sign(reward)
+    return bool(expected > 0.0 and expected >= HALF * abs(reward) * axis.gamma**ahead)
+
+
+def _foreseen_steps(episode: Episode) -> tuple[IntArray, IntArray]:
+    """Returns `[T]` twice: how long before each reward was foreseen, and could have been at most.
+
+    It is −1 where it was not even expected when it came.
+    """
+    axis, total = episode.time_axis, len(episode)
+    t, rewards, predicted = np.arange(total), episode.rewards, episode.predicted
+    began = np.maximum.accumulate(np.append(0, np.where(episode.ends, t + 1, 0)))[:total]
+    limit = np.minimum(t - began, axis.num_steps - 1)
+    steps, still = np.full(total, -1), np.ones(total, dtype=np.bool_)
+    for ahead in range(axis.num_steps):
+        expected = predicted[np.maximum(t - ahead, 0), ahead // axis.width] * np.sign(rewards)
+        enough = (expected > 0.0) & (expected >= HALF * np.abs(rewards) * axis.gamma**ahead)
+        still &= enough & (ahead <= limit)
+        if not still.any():
+            break
+        steps[still] = ahead
+    return steps, limit
+
+
+# ---- promises that were not kept ---------------------------------------------------------------
+
+
+def broken_promises(played: Played) -> list[Claim]:
+    """Returns the promises that were not kept in time, the longest first."""
+    claims = every(played, broken_promise, overdue_promise, late_promise)
+    return sorted(claims, key=lambda claim: claim.first - claim.last)
+
+
+def _is_overdue(
+    played: Played, first: int, last: int, component: int, came: int | None, **_: object
+) -> bool:
+    """Returns whether a reward stayed so far away from a step to another one, and did not come.
+
+    At all these steps the component is what is promised (see `promised`), which it is not at the
+    step before or after, and no end lies between them. Before it came no w steps on end paid half
+    of what was promised: the least of the component there, without its discount.
+    """
+    episode, total, found = played.episode, len(played.episode), promised(played.episode)
+    is_same = bool((found[first : last + 1] == component).all())
+    begins = first == 0 or episode.ends[first - 1] or found[first - 1] != component
+    stops = last == total - 1 or episode.ends[last] or found[last + 1] != component
+    is_one = not episode.ends[first:last].any()
+    least = float(episode.predicted[first : last + 1, component].min())
+    width, discount = episode.time_axis.width, episode.time_axis.discounts[component]
+    before = range(first, total if came is None else came)
+    paid = [discount * episode.rewards[max(first, i - width + 1) : i + 1].sum() for i in before]
+    return bool(is_same and begins and stops and is_one) and max(paid) < HALF * least
+
+
+_STAYED = "From {first:step} to {last:step} a reward was always {away:text} away"
+
+
+@EPISODES.rule(f"{_STAYED}, and never came.", holds=_is_overdue)
+def broken_promise(played: Played) -> Iterator[Fields]:
+    """It never came, and the episode ended."""
+    if played.episode.terminated:
+        yield from (of for of in _overdue(played) if of["came"] is None)
+
+
+@EPISODES.rule(f"{_STAYED}, and had not come when the episode was cut off.", holds=_is_overdue)
+def overdue_promise(played: Played) -> Iterator[Fields]:
+    """It had not come when the episode was cut off."""
+    if not played.episode.terminated:
+        yield from (of for of in _overdue(played) if of["came"] is None)
+
+
+@EPISODES.rule(f"{_STAYED}, and came only at {{came:step}}.", holds=_is_overdue)
+def late_promise(played: Played) -> Iterator[Fields]:
+    yield from (of for of in _overdue(played) if of["came"] is not None)
+
+
+def _overdue(played: Played) -> Iterator[Fields]:
+    """Yields the stretches of steps at which a promised reward was overdue, and when it came."""
+    episode, axis = played.episode, played.episode.time_axis
+    for first, last, component in _stays(episode):
+        kept = _kept_at(episode, first, last, component)
+        is_long = last - first + 1 > (component + 1) * axis.width
+        if is_long and (kept is None or kept > last):
+            steps = [component * axis.width, (component + 1) * axis.width - 1]
+            away = " to ".join(f"{step:,}" for step in dict.fromkeys(steps))
+            noun = "step" if steps[-1] == 1 else "steps"
+            fields = {"first": first, "last": last, "component": component, "came": kept}
+            yield fields | {"away": f"{away} {noun}"}
+
+
+def _kept_at(episode: Episode, first: int, last: int, component: int) -> int | None:
+    """Returns the first step by which half of what was promised was paid; None if there is none."""
+    width, discount = episode.time_axis.width, episode.time_axis.discounts[component]
+    least = HALF * float(episode.predicted[first : last + 1, component].min())
+    for step in range(first, len(episode)):
+        if discount * episode.rewards[max(first, step - width + 1) : step + 1].sum() >= least:
+            return step
+    return None
+
+
+def promised(episode: Episode) -> IntArray:
+    """Returns `[T]`, the component of which a reward is promised at each step; −1 where none is.
+
+    It is the largest explicit component of the action taken, if it is above 0 and, without the
+    discount, at least half of the largest one that was predicted in the episode and of the largest
+    reward that came.
+    """
+    explicit = episode.predicted[:, :-1].astype(np.float64)  # [T, N]
+    if not explicit.size:
+        return np.full(len(episode), -1)
+    discounts = np.maximum(episode.time_axis.discounts[:-1], SMALLEST_DISCOUNT)
+    least = (
+        HALF * max(float((explicit / discounts).max()), float(episode.rewards.max())) * discounts
+    )
+    best = explicit.argmax(axis=1)
+    largest = explicit[np.arange(len(episode)), best]
+    return np.where((largest > 0.0) & (largest >= least[best]), best, -1)
+
+
+def _stays(episode: Episode) -> Iterator[tuple[int, int, int]]:
+    """Yields the first and the last step of every stretch with one promised component."""
+    end = next_flag(episode.ends, len(episode))  # [T], the same on this side of an end
+    keys = zip(promised(episode).tolist(), end.tolist(), strict=True)
+    for (component, _), group in groupby(enumerate(keys), key=lambda pair: pair[1]):
+        steps = [step for step, _ in group]
+        if component >= 1 and len(steps) >= LEAST_SPAN:
+            yield steps[0], steps[-1], component

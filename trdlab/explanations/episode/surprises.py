@@ -1,0 +1,154 @@
+"""Steps of an episode that turned out other than expected, and why."""
+
+from functools import lru_cache, partial
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.explanations.episode.played import EPISODES, Played
+from trdlab.explanations.rules import Claim, Fields
+
+FOCUS = 1 / 3
+"""The share of a surprise that one component must account for, to be named as its reason."""
+NEARLY = 1 / 4
+"""The share of what moved from one step to another by which signs may be mixed there."""
+
+_TURNED = "At {step:step} {action} turned out {gap:number} {outcome:text} than expected"
+_ALIKE = "the total hardly changed."
+_SAYS = {
+    "turned-out": f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
+    "ended-early": (  # the future ended, which changed more than the reward did
+        f"{_TURNED}, mainly because {{ending:text}} while {{promised:rewards}} were still expected."
+    ),
+    "other-reward": (
+        f"{_TURNED}, mainly because {{reward:paid}} came where {{expected:number}} was expected."
+    ),
+    "no-reward": f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
+    "other-belief": (  # of a later component
+        f"{_TURNED}, mainly because what it expects {{component:when}} went from {{was:number}} to "
+        "{now:number}."
+    ),
+    "spread-out": (  # half of what speaks for the outcome lies at a step or before
+        f"{_TURNED}, spread over many steps: half of it {{by:within}}."
+    ),
+    "put-off": (
+        "At {step:step} {action} put off {worth:rewards}, now expected {to:when}, not "
+        f"{{origin:when}}; {_ALIKE}"
+    ),
+    "brought-forward": (
+        "At {step:step} {action} brought {worth:rewards} forward, now expected {to:when}, not "
+        f"{{origin:when}}; {_ALIKE}"
+    ),
+    "exchanged": (
+        "At {step:step} {action} gained {gain:number} {up:when} and lost {loss:number} "
+        f"{{down:when}}: {_ALIKE}"
+    ),
+}
+"""Of each kind of turn its sentence; each is one rule."""
+
+
+def surprise(played: Played, row: int) -> Claim:
+    """Returns what is to say of a step that changed something.
+
+    Args:
+        played: the episode.
+        row: the place of the step in its revision.
+    """
+    kind, fields = _turns(played)[row]
+    return Claim(EPISODES.rules[kind], played, fields)
+
+
+# ---- what a step changed -----------------------------------------------------------------------
+
+
+@lru_cache(maxsize=8)
+def _turns(played: Played) -> tuple[tuple[str, Fields], ...]:
+    """Returns `[T′]`, of each step of the revision what kind of turn it was, and its numbers."""
+    return tuple(_turn(played, row) for row in range(len(played.revision)))
+
+
+def _of_kind(kind: str, played: Played) -> list[Fields]:
+    return [fields for name, fields in _turns(played) if name == kind]
+
+
+for _kind, _says in _SAYS.items():
+    EPISODES.rule(_says, kind=_kind)(partial(_of_kind, _kind))
+
+
+def _turn(played: Played, row: int) -> tuple[str, Fields]:
+    of = played.revision
+    step, before, after = int(of.steps[row]), of.before[row], of.after[row]
+    about: Fields = {"step": step, "action": played.action(step)}
+    up, down, moved = moved_between(after - before)
+    if moved:
+        return _shift(about, before, after, up, down, moved)
+    change = after - before
+    total = float(change.sum())
+    about |= {"gap": abs(total), "outcome": "better" if total > 0.0 else "worse"}
+    directed = np.sign(total) * change  # what is above 0 speaks for the outcome
+    if len(directed) == 1:
+        return "turned-out", about
+    if of.ended[row] and float(directed[1:].sum()) > directed[0]:
+        is_over = played.episode.terminated and of.last[row] == len(played.episode) - 1
+        ending = "the episode ended" if is_over else "a life was lost"
+        return "ended-early", about | {"ending": ending, "promised": float(before[1:].sum())}
+    peak = focus(directed)
+    if peak == 0:
+        expected = {"expected": float(before[0])}
+        if after[0] == 0.0:
+            return "no-reward", about | expected
+        return "other-reward", about | expected | {"reward": float(after[0])}
+    if peak is not None:
+        was, now = float(before[peak]), float(after[peak])
+        return "other-belief", about | {"component": peak, "was": was, "now": now}
+    so_far = np.maximum(directed, 0.0).cumsum()
+    half = int((so_far >= so_far[-1] / 2.0).argmax())
+    return "spread-out", about | {"by": (half + 1) * played.episode.time_axis.width - 1}
+
+
+def _shift(
+    about: Fields, before: FloatArray, after: FloatArray, up: int, down: int, moved: float
+) -> tuple[str, Fields]:
+    """Returns what a step did that moved rewards, or costs, and left the total about the same."""
+    slack = NEARLY * moved
+    if before[up] >= -slack and after[down] >= -slack:
+        worth, origin, to = moved, down, up
+    elif after[up] <= slack and before[down] <= slack:
+        worth, origin, to = -moved, up, down
+    else:
+        gain, loss = float(after[up] - before[up]), float(before[down] - after[down])
+        return "exchanged", about | {"up": up, "gain": gain, "down": down, "loss": loss}
+    kind = "put-off" if to > origin else "brought-forward"
+    return kind, about | {"worth": worth, "origin": origin, "to": to}
+
+
+def focus(directed: FloatArray) -> int | None:
+    """Returns the component that changed most in a direction, None if many changed as much.
+
+    Args:
+        directed: `[N+1]`, the change; what is above 0 speaks for the outcome.
+    """
+    peak = int(directed.argmax())
+    return peak if directed[peak] >= FOCUS * np.maximum(directed, 0.0).sum() else None
+
+
+def moved_between(change: FloatArray) -> tuple[int, int, float]:
+    """Returns where most was gained and lost, and how much of it moved; 0 if the total changed.
+
+    Args:
+        change: `[N+1]`; its total must be at most half of what moved.
+    """
+    up, down = int(change.argmax()), int(change.argmin())
+    moved = max(0.0, float(min(change[up], -change[down])))
+    return up, down, moved if abs(float(change.sum())) <= moved / 2.0 else 0.0
+
+
+def sizes(played: Played) -> FloatArray:
+    """Returns `[T′]`, in discounted reward, how much the steps of the revision surprise.
+
+    That is how much the total changed; where as much is expected as before, how much moved.
+    """
+    change = played.revision.change
+    amount = np.abs(change.sum(axis=1))
+    moved = np.maximum(0.0, np.minimum(change.max(axis=1), -change.min(axis=1)))
+    return np.asarray(np.where(amount <= moved / 2.0, moved, amount))

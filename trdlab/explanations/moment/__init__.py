@@ -1,0 +1,1 @@
+"""A moment: what an agent expects here and now, and why nothing else."""

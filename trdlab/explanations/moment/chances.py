@@ -1,0 +1,109 @@
+"""Chances: what is uncertain about what an action is expected to pay."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.explanations.moment.steps import (
+    NEGLIGIBLE,
+    SHARE,
+    explicit_end,
+    largest,
+    undiscounted,
+)
+from trdlab.explanations.rules import Fields
+
+
+def outcomes_of(choice: Choice) -> Sequence[dict[float, float]]:
+    """Returns the chance of each reward at each explicit step; nothing where it is not known."""
+    known = choice.moment.uncertainty
+    if known is None or not known.outcomes:
+        return ()
+    end = explicit_end(choice.moment, choice.action)
+    return known.outcomes[choice.moment.index(choice.action)][:end]
+
+
+@CHOICES.rule(
+    "It puts the chance that {action} pays {reward:number} {component:when} at {chance:percent}."
+)
+def put_at(choice: Choice) -> Iterator[Fields]:
+    """The chance that the largest component implies, where one reward or none is ever observed.
+
+    With w = 1 component k is γ^k·c times the probability that step k pays c (errata P9, P10).
+    """
+    moment, paid = choice.moment, choice.moment.only_reward
+    row = undiscounted(moment, choice.action)
+    is_judged = moment.trust is not None and not moment.is_exact
+    if paid is None or not is_judged or choice.time_axis.width != 1 or not row.any():
+        return
+    i = largest(moment, choice.action)
+    chance = float(row[i] / paid)
+    if 0.0 < chance <= 1.0:
+        yield {"action": choice.action, "reward": paid, "component": i, "chance": chance}
+
+
+@CHOICES.rule(
+    "{action} is worth {value:number} on average; single episodes differ from that by about "
+    "{deviation:number}."
+)
+def give_or_take(choice: Choice) -> Iterator[Fields]:
+    """One standard deviation of the whole discounted reward, if it is not `NEGLIGIBLE`."""
+    moment, action = choice.moment, choice.action
+    if moment.uncertainty is not None:
+        deviation = float(moment.uncertainty.return_deviation[moment.index(action)])
+        value = moment.q_value(action)
+        if deviation > NEGLIGIBLE * abs(value):
+            yield {"action": action, "value": value, "deviation": deviation}
+
+
+@CHOICES.rule("There is a {chance:percent} chance that {action} {reward:pays} {component:when}.")
+def either_or(choice: Choice) -> Iterator[Fields]:
+    """A step that pays one amount or nothing; of several, where most of it is expected.
+
+    The amount matters: it is at least `SHARE` of the action's value and of the largest reward that
+    is expected of it at one step, and what is expected of it at least `NEGLIGIBLE`.
+    """
+    either = {
+        i: (reward, chance)
+        for i, step in enumerate(outcomes_of(choice))
+        for reward, chance in step.items()
+        if set(step) == {0.0, reward} and reward != 0.0
+    }
+    if not either:
+        return
+    expected = {i: abs(reward) * chance for i, (reward, chance) in either.items()}
+    i = max(expected, key=expected.__getitem__)
+    row = undiscounted(choice.moment, choice.action)
+    scale = max(abs(choice.moment.q_value(choice.action)), float(np.abs(row).max()))
+    reward, chance = either[i]
+    if abs(reward) >= SHARE * scale and expected[i] >= NEGLIGIBLE * scale:
+        yield {"action": choice.action, "reward": reward, "component": i, "chance": chance}
+
+
+@CHOICES.rule(
+    "After {action} the episode has ended {last_step:within} with {chance:percent} probability."
+)
+def likely_over(choice: Choice) -> Iterator[Fields]:
+    """The first component at whose beginning the episode has more likely ended than not."""
+    yield from (over for over in _over(choice) if over["chance"] < 1.0)
+
+
+@CHOICES.rule("After {action} the episode is over {last_step:within}.")
+def surely_over(choice: Choice) -> Iterator[Fields]:
+    """It has ended for certain by the first component at which it has likely ended."""
+    yield from (over for over in _over(choice) if over["chance"] == 1.0)
+
+
+VARYING, LASTING = (give_or_take,), (likely_over, surely_over)
+
+
+def _over(choice: Choice) -> Iterator[Fields]:
+    known = choice.moment.uncertainty
+    if known is not None:
+        survival = known.survival[choice.moment.index(choice.action)]
+        below = np.flatnonzero(survival < 0.5)
+        if below.size:
+            last_step = choice.time_axis.start(int(below[0])) - 1
+            chance = 1.0 - float(survival[below[0]])
+            yield {"action": choice.action, "last_step": last_step, "chance": chance}

@@ -1,0 +1,186 @@
+"""Peaks: where what is expected of an action peaks, how sharply, and whether that repeats."""
+
+from collections.abc import Collection, Iterator
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.explanations.moment.moment import CHOICES, Choice, Moment
+from trdlab.explanations.moment.steps import (
+    SHARE,
+    effect_of,
+    explicit_end,
+    largest,
+    shares,
+    stands_out,
+    undiscounted,
+)
+from trdlab.explanations.rules import Claim, Fields, every
+
+ALIKE = 0.05
+"""How far what is about the same may be from its mean, as a share of that."""
+
+UNEVEN = 0.25
+"""How far the spacings of a rhythm may be from their mean, as a share of it."""
+
+MOST_PEAKS = 4  # that are named one by one
+
+
+def regular(choice: Choice, named: Collection[int] = ()) -> list[Claim]:
+    """Returns a rhythm, or the largest component and the peaks, and how wide the highest peak is.
+
+    Args:
+        choice: whose action it is about.
+        named: components that have been told of; if one is about the largest, that is not said.
+    """
+    sizes = np.abs(shares(choice.moment, choice.action))
+    is_told = any(i < len(sizes) and sizes[i] >= 1.0 - ALIKE for i in named)
+    single = every(choice, *(() if is_told else (peak,)), several_peaks)
+    return (every(choice, rhythm) or single) + every(choice, spread)
+
+
+@CHOICES.rule("Each of {count:next} {mean:pays} after {action}{average:average}.")
+def steady(choice: Choice) -> Iterator[Fields]:
+    """Each of three or more steps is within `ALIKE` of their mean; w = 1."""
+    row = undiscounted(choice.moment, choice.action)
+    if len(row) < 3 or choice.time_axis.width != 1:
+        return
+    mean = float(row.mean())
+    if mean != 0.0 and (np.abs(row - mean) <= ALIKE * abs(mean)).all():
+        is_same = choice.moment.is_sure(choice.action) and bool((row == row[0]).all())
+        fields = {"count": len(row), "action": choice.action, "average": is_same}
+        yield fields | {"mean": float(row[0]) if is_same else mean}
+
+
+@CHOICES.rule(
+    "The largest {effect:text} after {action} {last_step:within} comes {component:when}: it is "
+    "worth {discounted:number} now."
+)
+def peak(choice: Choice) -> Iterator[Fields]:
+    """The largest of several components, without their discount; of what was learned, a peak."""
+    moment, action = choice.moment, choice.action
+    sizes = np.abs(shares(moment, action))
+    if np.count_nonzero(stands_out(moment, action)) < 2:
+        return
+    i = int(sizes.argmax())
+    is_alone = bool((np.delete(sizes, i) < sizes[i]).all())
+    if is_alone and (moment.is_exact or i in peaks(moment, action)):
+        value = float(moment.components(action)[i])
+        yield _about(choice) | {"effect": effect_of(value), "component": i, "discounted": value}
+
+
+@CHOICES.rule(
+    "{last_step:within} the {effect:text} expected after {action} peaks {components:whens}."
+)
+def several_peaks(choice: Choice) -> Iterator[Fields]:
+    """The most prominent of several peaks."""
+    found = peaks(choice.moment, choice.action)
+    if len(found) > 1:
+        yield _about(choice) | {"components": _clearest(choice.moment, choice.action, found)}
+
+
+@CHOICES.rule(
+    "{last_step:within} the {effect:text} expected after {action} peaks every {period:text} steps, "
+    "first {first:when} and last {last:when}."
+)
+def rhythm(choice: Choice) -> Iterator[Fields]:
+    """Three or more peaks whose spacings are nearly equal: each is within `UNEVEN` of their mean.
+
+    The period is the smallest and the largest of them, in steps. In an exact table each may also be
+    one component off. Noise has peaks too: of what was learned, and has not been judged, there have
+    to be four.
+    """
+    moment, action = choice.moment, choice.action
+    found = peaks(moment, action)
+    is_judged = moment.is_exact or moment.error_of(action) is not None
+    if len(found) < (3 if is_judged else 4):
+        return
+    spacings = np.diff(found)
+    mean = float(spacings.mean())
+    if (np.abs(spacings - mean) <= max(UNEVEN * mean, 1.0 * moment.is_exact)).all():
+        ends = sorted({int(of) * choice.time_axis.width for of in (spacings.min(), spacings.max())})
+        period = " to ".join(map(str, ends))
+        yield _about(choice) | {"period": period, "first": found[0], "last": found[-1]}
+
+
+@CHOICES.rule(
+    "The {effect:text} expected after {action} {component:when} is spread over {steps:steps}: "
+    "either its time is uncertain, or it comes bit by bit."
+)
+def spread(choice: Choice) -> Iterator[Fields]:
+    """The highest peak of what was learned is wider than a step, at half its prominence; w = 1."""
+    moment, action = choice.moment, choice.action
+    sizes, found = shares(moment, action), peaks(moment, action)
+    if moment.is_exact or choice.time_axis.width != 1 or not found:
+        return
+    i = max(found, key=lambda at: sizes[at])
+    first, last = _flanks(sizes, i)
+    if last > first and last < len(sizes) - 1:
+        fields = {"component": i, "steps": last - first + 1, "first": first, "last": last}
+        yield _about(choice) | fields
+
+
+# ---- the numbers -------------------------------------------------------------------------------
+
+
+def _about(choice: Choice) -> Fields:
+    moment, action = choice.moment, choice.action
+    return {
+        "action": action,
+        "effect": effect_of(undiscounted(moment, action)[largest(moment, action)]),
+        "last_step": explicit_end(moment, action) * choice.time_axis.width - 1,
+    }
+
+
+def prominence(row: FloatArray, i: int) -> float:
+    """Returns how far a row falls on both sides of a place before it comes to one that is higher.
+
+    On the left an equal one counts as higher, so of equals the first stands for all; where there is
+    none, nothing limits the place on that side: nothing comes before the action. On the right the
+    row has to fall before it ends, for what comes after it is not known.
+
+    >>> [round(prominence(np.array([0.0, 3.0, 2.0, 2.5, 1.0]), i), 1) for i in range(5)]
+    [0.0, 2.0, 0.0, 0.5, 0.0]
+    """
+    higher = np.flatnonzero(row[:i] >= row[i])
+    left = row[higher[-1] : i + 1].min() if higher.size else -np.inf
+    beyond = np.flatnonzero(row[i:] > row[i])
+    right = row[i : i + int(beyond[0]) if beyond.size else len(row)].min()
+    return float(row[i] - max(left, right))
+
+
+def peaks(moment: Moment, action: str) -> list[int]:
+    """Returns the components at which what is expected of an action peaks, in order of time.
+
+    A peak stands out by itself and by its prominence: both are at least `SHARE` of the largest. Of
+    what was learned the prominence is also no less than what such forecasts are off by there.
+    """
+    sizes = shares(moment, action)
+    allowed = np.maximum(SHARE, _doubt(moment, action))
+    return [
+        i for i in np.flatnonzero(sizes >= SHARE).tolist() if prominence(sizes, i) >= allowed[i]
+    ]
+
+
+def _doubt(moment: Moment, action: str) -> FloatArray:
+    """Returns `[K]`: what such forecasts are off by, in the unit of `shares`; 0 if not known."""
+    row, errors = undiscounted(moment, action), moment.error_of(action)
+    if errors is None or moment.is_exact or not row.any():
+        return np.zeros(len(row))
+    error = np.nan_to_num(errors[: len(row)]) / moment.time_axis.discounts[: len(row)]
+    return np.asarray(error / np.abs(row).max())
+
+
+def _clearest(moment: Moment, action: str, found: list[int]) -> tuple[int, ...]:
+    """Returns the most prominent peaks, of equals the earlier, in order of time."""
+    sizes = shares(moment, action)
+    order = sorted(found, key=lambda i: -prominence(sizes, i))
+    return tuple(sorted(order[:MOST_PEAKS]))
+
+
+def _flanks(sizes: FloatArray, at: int) -> tuple[int, int]:
+    """Returns the first and last place around a peak that are above half its prominence."""
+    below = sizes < sizes[at] - prominence(sizes, at) / 2.0
+    before, after = np.flatnonzero(below[:at]), np.flatnonzero(below[at:])
+    first = int(before[-1]) + 1 if before.size else 0
+    return first, at + int(after[0]) - 1 if after.size else len(sizes) - 1

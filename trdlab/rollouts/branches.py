@@ -1,0 +1,279 @@
+"""Branches: what else could have followed, from copies of the states that an agent came to."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.decomposition import TimeAxis
+from trdlab.environments import CopyableEnvironments
+from trdlab.errors import InputError
+from trdlab.estimator import Estimator
+from trdlab.policies import Policy
+from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
+from trdlab.rollouts.realised import Samples, all_or_none
+
+
+class TooFewMoments(InputError):  # noqa: N818  it says what episodes are, not what failed
+    """Episodes that are over before there is a moment to copy, or a second one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """M moments of E episodes, and what followed each of them n times, from copies of its state.
+
+    Args:
+        time_axis: what the components mean.
+        actions: `[M]`, the first action of every copy.
+        predicted: `[M, N+1]`, what was predicted of it, in discounted reward.
+        observed: `[M, n, N+1]`, what followed, in discounted reward.
+        known: `[M, N+1]`, whether that is known of all n.
+        episode: `[M]`, the number of the episode of each, in order.
+        num_episodes: E.
+    """
+
+    time_axis: TimeAxis
+    actions: IntArray
+    predicted: FloatArray
+    observed: FloatArray
+    known: BoolArray
+    episode: IntArray
+    num_episodes: int
+
+    @property
+    def copies(self) -> int:
+        """How often each moment was continued."""
+        return int(self.observed.shape[1])
+
+    @property
+    def samples(self) -> Samples:
+        """The same as M·n samples, for `calibrate`: of foils, this is their calibration."""
+        n = self.copies
+        known = np.repeat(self.known, n, axis=0)
+        return Samples(
+            time_axis=self.time_axis,
+            predicted=np.repeat(self.predicted, n, axis=0),
+            observed=np.where(known, self.observed.reshape(known.shape), 0.0),
+            known=known,
+            episode=np.repeat(self.episode, n),
+            num_episodes=self.num_episodes,
+        )
+
+
+@dataclass(frozen=True)
+class Copying:
+    """How much is copied of the states of an agent.
+
+    Args:
+        episodes: how many are played for the ceiling.
+        moments: how many states of each are copied, about.
+        copies: how often each is.
+        tries: how often each of two actions is tried at a state.
+    """
+
+    episodes: int = 20
+    moments: int = 5
+    copies: int = 8
+    tries: int = 50
+
+
+@dataclass(frozen=True)
+class Branching:
+    """How moments are copied and continued.
+
+    Args:
+        estimator: whose policy is followed, and whose predictions are kept; its `future` says
+            which rewards count, and what ends.
+        policy: who acts, where that is not the estimator's greedy policy.
+        copies: n, how often each moment is continued.
+        steps: how many steps a copy is followed; by default those of the explicit components.
+            The residual is known only of moments whose copies have all ended by then.
+
+    Raises:
+        InputError: there is less than one copy, or the steps do not reach the residual.
+    """
+
+    estimator: Estimator
+    policy: Policy | None = None
+    copies: int = 8
+    steps: int | None = None
+
+    def __post_init__(self) -> None:
+        least = self.estimator.time_axis.num_steps
+        if self.copies < 1:
+            raise InputError(f"There are {self.copies} copies.", "Ask for at least 1.")
+        if self.steps is not None and self.steps < least:
+            raise InputError(
+                f"The copies are followed for {self.steps} steps.",
+                f"The explicit components reach {least} steps.",
+            )
+
+    def along(
+        self,
+        environments: CopyableEnvironments,
+        *,
+        every: int,
+        epsilon: float = 0.0,
+        max_steps: int | None = None,
+        seed: int = 0,
+        foils: bool = False,
+        watch: Watch = unwatched,
+    ) -> Branches:
+        """Plays one episode in each environment, and continues every so manieth moment n times.
+
+        The first of them is drawn evenly from the first `every`, so that each step of an episode
+        is as likely as any other.
+
+        Args:
+            environments: E of them; they are reset.
+            every: the steps from one moment to the next.
+            epsilon: the chance of a random action in the episodes, as in `collect`; after its first
+                action a copy follows the policy alone.
+            max_steps: after which an episode is cut off; its copies go on.
+            seed: of the actions, the moments and the copies.
+            foils: whether each copy begins with an action other than the policy's, drawn evenly.
+            watch: told how far the episodes are, after every step.
+
+        Raises:
+            TooFewMoments: there are fewer than two.
+        """
+        rng, count = np.random.default_rng(seed), environments.num_envs
+        phase, found = rng.integers(every, size=count), []
+        playing = Playing(
+            self.estimator,
+            environments,
+            rng,
+            policy=self.policy,
+            epsilon=epsilon,
+            max_steps=max_steps,
+        )
+        what = "episodes with copies of first actions" if foils else "episodes with copies"
+        while playing.running.any():
+            turn = playing.turn()
+            due = np.flatnonzero(playing.running & (playing.steps % every == phase))  # [M′]
+            if len(due):
+                own, actions = turn.own[due], turn.actions[due]
+                first = _others(own, environments.num_actions, rng) if foils else actions
+                found.append(self._continued(playing, due, first, playing.steps, rng))
+            playing.take(turn.actions)
+            watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
+        copied = sum(len(part.actions) for part in found)
+        if copied < 2:
+            raise TooFewMoments(
+                f"The episodes are so short that there are moments in them: {copied}.",
+                "Copy moments more often, or play more episodes.",
+            )
+        return self._joined(found, count)
+
+    def at(
+        self, playing: Playing, action: int, *, age: int | None = None, seed: int = 0
+    ) -> Branches:
+        """Continues the first episode n times from where it stands, beginning with an action.
+
+        Args:
+            playing: where it stands; it is left as it is.
+            action: the first one of every copy.
+            age: the steps since the episode began; by default those that were played.
+            seed: of the copies.
+
+        Raises:
+            InputError: there is no such action.
+            NotCopyable: the environments cannot be copied.
+        """
+        num_actions = playing.environments.num_actions
+        if not 0 <= action < num_actions:
+            raise InputError(
+                f"There is no action {action}.", f"They run from 0 to {num_actions - 1}."
+            )
+        rng, age = np.random.default_rng(seed), playing.steps if age is None else age
+        found = self._continued(playing, np.array([0]), np.array([action]), age, rng)
+        return self._joined([found], 1)
+
+    def _continued(
+        self,
+        playing: Playing,
+        moments: IntArray,
+        first: IntArray,
+        age: int,
+        rng: np.random.Generator,
+    ) -> Branches:
+        """Continues the `moments [M]` with the actions `first [M]`."""
+        axis, copies = self.estimator.time_axis, self.copies
+        here = np.searchsorted(np.flatnonzero(playing.running), moments)  # [M], of those asked
+        predicted = playing.decide().decomposition.components[here, first]  # [M, N+1]
+        which, length = np.repeat(moments, copies), self.steps or axis.num_steps  # [M·n]
+        branch = playing.branch(which, seed=int(rng.integers(2**31)), rng=rng, max_steps=length)
+        rewards, ended = self._followed(branch, np.repeat(first, copies), length)
+        observed, known = _on_axis(axis, rewards, ended, self._time_limit(playing), age)
+        shape = (len(moments), copies, axis.num_components)
+        return Branches(
+            time_axis=axis,
+            actions=first,
+            predicted=predicted.astype(np.float64),
+            observed=observed.reshape(shape),
+            known=np.asarray(known.reshape(shape).all(axis=1)),
+            episode=moments,
+            num_episodes=playing.environments.num_envs,
+        )
+
+    def _time_limit(self, playing: Playing) -> int | None:
+        """Returns the steps beyond which nothing can be known."""
+        own = playing.environments.time_limit
+        return None if self.estimator.future.time_limit_ends else own
+
+    def _followed(
+        self, branch: Playing, actions: IntArray, length: int
+    ) -> tuple[FloatArray, IntArray]:
+        """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, the ends.
+
+        An end is the number of steps until nothing is left to come; −1 where none was seen.
+        """
+        count, future = len(actions), self.estimator.future
+        rewards, ended = np.zeros((count, length)), np.full(count, -1)
+        while branch.running.any():
+            running, t = branch.running, branch.steps
+            step = branch.take(branch.turn().actions if t else actions)
+            rewards[running, t] = future.count(step.rewards)[running]
+            end = running & future.ends(step.terminated, step.truncated, step.life_lost)
+            ended[end] = t + 1
+            rewards[running & step.truncated & ~end, t + 1 :] = np.nan
+            branch.stop(end)
+        return rewards, ended
+
+    def _joined(self, found: list[Branches], num_episodes: int) -> Branches:
+        """Returns the moments of all times, in the order of their episodes."""
+        order = np.argsort(np.concatenate([part.episode for part in found]), kind="stable")
+        names = ("actions", "predicted", "observed", "known", "episode")
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in found])[order] for name in names
+        }
+        arrays["known"] = all_or_none(arrays["known"])
+        return replace(found[0], **arrays, num_episodes=num_episodes)
+
+
+def _others(actions: IntArray, num_actions: int, rng: np.random.Generator) -> IntArray:
+    """Returns `[M]`: another action in place of each, drawn evenly."""
+    if num_actions < 2:
+        raise InputError("There is one action only.", "A foil is another one.")
+    return np.asarray((actions + rng.integers(1, num_actions, size=len(actions))) % num_actions)
+
+
+def _on_axis(
+    axis: TimeAxis, rewards: FloatArray, ended: IntArray, time_limit: int | None, age: int
+) -> tuple[FloatArray, BoolArray]:
+    """Returns `[B, N+1]` twice: the components of `rewards [B, steps]`, and where they are known.
+
+    As in `what_followed`, nothing beyond a `time_limit` is known, wherever the episode ended.
+    """
+    count, length = rewards.shape
+    discounted = rewards * axis.gamma ** np.arange(length)
+    explicit = discounted[:, : axis.num_steps].reshape(count, axis.horizon, axis.width)
+    residual = discounted[:, axis.num_steps :].sum(axis=1)
+    observed = np.column_stack([explicit.sum(axis=2), residual])  # [B, N+1]
+    known = ~np.isnan(observed)
+    known[:, -1] &= ended >= 0
+    if time_limit is not None:
+        beyond = age + axis.width * np.arange(1, axis.num_components)
+        known[:, :-1] &= beyond <= time_limit
+    return np.where(known, observed, 0.0), known

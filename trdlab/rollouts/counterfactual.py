@@ -1,0 +1,148 @@
+"""Counterfactuals: what really follows an action and its foil, from copies of one state."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trdlab.arrays import RELATIVE_ZERO, FloatArray
+from trdlab.decomposition import TimeAxis
+from trdlab.errors import InputError
+from trdlab.rollouts.branches import Branches, Branching
+from trdlab.rollouts.playing import Playing
+from trdlab.statistics import Estimates, mean_difference
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What is known from elsewhere of the rewards that can come.
+
+    Args:
+        range: `[2, N+2]`, the least and the most that ever came of every component, and of all
+            together.
+        chance: whether copies of a state ever went differently; None where none were made.
+    """
+
+    range: FloatArray
+    chance: bool | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Counterfactual:
+    """How the futures of two actions differ, as predicted and as they followed.
+
+    Args:
+        time_axis: what the components mean.
+        action: the number of one action.
+        foil: the number of the other.
+        copies: how often each was tried.
+        whole: whether all copies came to an end, so that the sum holds the residual too; otherwise
+            it is that of the explicit components.
+        predicted: `[N+2]`, action − foil of every component, and of their sum.
+        observed: `[N+2]`, the same of the means of what followed; NaN where that is not known.
+            Intervals mind what is too rare to be seen; they have no width where there is no chance.
+        same_every_time: whether all copies of each action brought the same, as far as is known.
+    """
+
+    time_axis: TimeAxis
+    action: int
+    foil: int
+    copies: int
+    whole: bool
+    predicted: FloatArray
+    observed: Estimates
+    same_every_time: bool
+
+
+def try_actions(
+    branching: Branching,
+    playing: Playing,
+    action: int,
+    foil: int,
+    *,
+    age: int | None = None,
+    seed: int = 0,
+) -> tuple[Branches, Branches]:
+    """Tries two actions, each from copies of the same state, and follows the policy after them.
+
+    Args:
+        branching: the estimator, and how many copies to make.
+        playing: where the state is: that of the first episode.
+        action: the number of one action.
+        foil: the number of the other.
+        age: the steps since the episode began; by default those that were played.
+        seed: of the copies.
+
+    Returns:
+        What followed the one and the other.
+
+    Raises:
+        InputError: there is no such action, or both are the same.
+        NotCopyable: the environments cannot be copied.
+    """
+    if action == foil:
+        raise InputError(f"Action and foil are both {action}.", "Give two different actions.")
+    one, other = np.random.SeedSequence(seed).generate_state(2).tolist()
+    return (
+        branching.at(playing, action, age=age, seed=one),
+        branching.at(playing, foil, age=age, seed=other),
+    )
+
+
+def compared(
+    tried: tuple[Branches, Branches], seen: Seen | None = None, *, seed: int = 0
+) -> Counterfactual:
+    """Returns how two actions differ that were tried.
+
+    Nothing can come that is less, or more, than what was ever seen or is predicted. Where all
+    copies of each brought the same, and not always nothing, there is no chance, unless copies went
+    differently elsewhere.
+
+    Args:
+        tried: what followed the one and the other.
+        seen: what is known from elsewhere of the rewards that can come.
+        seed: of the intervals.
+    """
+    whole = all(bool(branches.known[0, -1]) for branches in tried)
+    one, other = (_futures(branches, whole) for branches in tried)  # [n, N+2]
+    said = np.stack([_with_sum(branches.predicted[0], whole) for branches in tried])  # [2, N+2]
+    everything = np.concatenate([one, other, said, *([] if seen is None else [seen.range])])
+    same = not any(np.nan_to_num(np.ptp(of, axis=0)).any() for of in (one, other))
+    chance = None if seen is None else seen.chance
+    if same and (chance is False or (chance is None and np.nan_to_num(one + other).any())):
+        value = one.mean(axis=0) - other.mean(axis=0)
+        observed = Estimates(value, value, value)
+    else:
+        rng = np.random.default_rng(seed)
+        observed = mean_difference(
+            one, other, everything.min(axis=0), everything.max(axis=0), rng=rng
+        )
+    return Counterfactual(
+        time_axis=tried[0].time_axis,
+        action=int(tried[0].actions[0]),
+        foil=int(tried[1].actions[0]),
+        copies=tried[0].copies,
+        whole=whole,
+        predicted=_apart(*said),
+        observed=observed,
+        same_every_time=same,
+    )
+
+
+def _apart(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Returns one − other, 0 where they differ only by rounding."""
+    difference, least = one - other, RELATIVE_ZERO * np.maximum(np.abs(one), np.abs(other))
+    return np.where(np.abs(difference) <= least, 0.0, difference)
+
+
+def _futures(branches: Branches, whole: bool) -> FloatArray:
+    """Returns `[n, N+2]`: every component of what followed, and their sum; NaN if not known."""
+    observed = np.where(branches.known[0], branches.observed[0], np.nan)  # [n, N+1]
+    if not whole and branches.time_axis.horizon == 0:
+        return np.column_stack([observed, observed])  # the sum of nothing that was seen is no 0
+    return _with_sum(observed, whole)
+
+
+def _with_sum(components: FloatArray, whole: bool) -> FloatArray:
+    """Returns `[..., N+2]`: components with their sum, or that of the explicit ones."""
+    counted = components if whole else components[..., :-1]
+    return np.concatenate([components, counted.sum(axis=-1, keepdims=True)], axis=-1)

@@ -1,0 +1,225 @@
+"""Episodes: what an agent predicted at every step, and what then happened."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.environments import Environments
+from trdlab.errors import InputError
+from trdlab.estimator import Estimator
+from trdlab.policies import Policy
+from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """One episode of T steps, with what was predicted at each of them.
+
+    Args:
+        decomposition: `[T, A, N+1]`, of every action.
+        expected: `[T+1, N+1]`, the components of the described policy's own action (their mean,
+            where it draws), at every observation from the first one to the true last one.
+        actions: `[T]`.
+        rewards: `[T]`, as the estimator counts them.
+        life_lost: `[T]`, whether a life was lost and the episode went on.
+        ends: `[T]`, whether nothing is left to come after a step, as the estimator's future says.
+        terminated: whether the episode ended for good; otherwise it was truncated.
+        random: `[T + N·w]`, whether the action was a random one instead of the policy's. It goes
+            on past the end as if there were more steps, so that what is left out because of it
+            does not depend on how long the episode was.
+        epsilon: the chance of a random action.
+        time_limit: the steps after which every such episode is truncated, if that is known.
+    """
+
+    decomposition: RewardDecomposition
+    expected: FloatArray
+    actions: IntArray
+    rewards: FloatArray
+    life_lost: BoolArray
+    ends: BoolArray
+    terminated: bool
+    random: BoolArray
+    epsilon: float = 0.0
+    time_limit: int | None = None
+
+    def __len__(self) -> int:
+        return len(self.actions)
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """What the components mean."""
+        return self.decomposition.time_axis
+
+    @property
+    def predicted(self) -> FloatArray:
+        """`[T, N+1]`: what was predicted of the actions taken."""
+        return np.asarray(self.decomposition.components[np.arange(len(self)), self.actions])
+
+
+class Recording:
+    """Episodes that are written down as they are played, and can be paused at any step.
+
+    Args:
+        estimator: whose predictions are kept; its `future` says which rewards count, and what ends.
+        environments: E of them; they are reset.
+        policy: who acts, where that is not the estimator's greedy policy.
+        epsilon: the chance of a random action instead. Random actions lead to more states; what
+            follows one is not held against what was predicted before it.
+        max_steps: after which an episode is truncated, if the environment has not ended it before;
+            it is a `time_limit` like that of an environment.
+        seed: of the actions.
+
+    Attributes:
+        playing: where the episodes stand.
+
+    Raises:
+        InputError: ε is outside [0, 1), or there is not a single step.
+    """
+
+    def __init__(
+        self,
+        estimator: Estimator,
+        environments: Environments,
+        *,
+        policy: Policy | None = None,
+        epsilon: float = 0.0,
+        max_steps: int | None = None,
+        seed: int = 0,
+    ) -> None:
+        if not 0.0 <= epsilon < 1.0:
+            raise InputError(f"ε is {epsilon}.", "It must be at least 0 and less than 1.")
+        if max_steps is not None and max_steps < 1:
+            raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
+        self._estimator, self._epsilon = estimator, epsilon
+        self._chance = np.random.default_rng([seed, 1])
+        self.playing = Playing(
+            estimator,
+            environments,
+            np.random.default_rng(seed),
+            policy=policy,
+            epsilon=epsilon,
+            chance=self._chance,
+            max_steps=max_steps,
+        )
+        count = environments.num_envs
+        self._logs: list[list[tuple[Any, ...]]] = [[] for _ in range(count)]
+        self._last, self._terminated = [np.zeros(0)] * count, np.zeros(count, dtype=np.bool_)
+
+    def play(
+        self, until: int | None = None, *, watch: Watch = unwatched, what: str = "episodes"
+    ) -> None:
+        """Plays on to the ends of all episodes, or until so many steps have been taken.
+
+        Args:
+            until: the steps; by default there is no such limit.
+            watch: told how far the episodes are, after every step.
+            what: they are called then.
+        """
+        playing, count = self.playing, len(self._logs)
+        while playing.running.any() and playing.steps != until:
+            self._take()
+            watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
+
+    def play_to(self, step: int) -> None:
+        """Plays the first episode to a step, at which it is paused.
+
+        Raises:
+            InputError: the episode is over by then, or the step is negative.
+        """
+        if step < 0:
+            raise InputError(f"The step is {step}.", "Steps are counted from 0.")
+        self.play(step)
+        if not self.playing.running[0]:
+            steps = len(self._logs[0])
+            raise InputError(
+                f"There is no step {step}: the episode is over after {steps} steps.",
+                f"Choose a step from 0 to {steps - 1}.",
+            )
+
+    def _take(self) -> None:
+        playing, future = self.playing, self._estimator.future
+        running, decision, turn = playing.running, playing.decide(), playing.turn()
+        step = playing.take(turn.actions)
+        ends = future.ends(step.terminated, step.truncated, step.life_lost)
+        happened = (turn.actions, future.count(step.rewards), step.life_lost, ends, turn.random)
+        seen = zip(decision.decomposition.components, decision.expected, strict=True)
+        for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
+            self._logs[env].append((*expectations, *(part[env] for part in happened)))
+        if playing.finished.any():
+            final = playing.at_last().expected
+            for env, expected in zip(np.flatnonzero(playing.finished), final, strict=True):
+                self._last[env] = expected
+            self._terminated |= playing.finished & step.terminated
+
+    def episodes(self) -> tuple[Episode, ...]:
+        """Returns the E episodes, once all of them are over, in the order of the environments."""
+        axis, future = self._estimator.time_axis, self._estimator.future
+        own = None if future.time_limit_ends else self.playing.environments.time_limit
+        limits = [limit for limit in (own, self.playing.max_steps) if limit is not None]
+        coins = self._chance.random((len(self._logs), axis.num_steps)) < self._epsilon  # [E, N·w]
+        return tuple(
+            _episode(
+                log,
+                self._last[env],
+                coins[env],
+                time_axis=axis,
+                terminated=bool(self._terminated[env]),
+                epsilon=self._epsilon,
+                time_limit=min(limits, default=None),
+            )
+            for env, log in enumerate(self._logs)
+        )
+
+
+def collect(
+    estimator: Estimator,
+    environments: Environments,
+    *,
+    watch: Watch = unwatched,
+    what: str = "episodes",
+    **how: Any,
+) -> tuple[Episode, ...]:
+    """Plays one episode in each environment to its end, by the policy that the estimator describes.
+
+    Args:
+        estimator: whose predictions are kept.
+        environments: E of them; they are reset.
+        watch: told how far the episodes are, after every step.
+        what: they are called then.
+        how: as for `Recording`.
+
+    Returns:
+        E episodes, in the order of the environments.
+
+    Raises:
+        InputError: ε is outside [0, 1), or there is not a single step.
+    """
+    recording = Recording(estimator, environments, **how)
+    recording.play(watch=watch, what=what)
+    return recording.episodes()
+
+
+def _episode(
+    log: list[tuple[Any, ...]],
+    last: FloatArray,
+    coins: BoolArray,
+    *,
+    time_axis: TimeAxis,
+    **rest: Any,
+) -> Episode:
+    """Returns the episode of a log, of the last expectation `[N+1]` and coins for past its end."""
+    columns = [np.stack(column) for column in zip(*log, strict=True)]
+    components, expected, actions, rewards, life_lost, ends, random = columns
+    return Episode(
+        decomposition=RewardDecomposition(components, time_axis),
+        expected=np.concatenate([expected, last[None]]).astype(np.float64),
+        actions=actions,
+        rewards=rewards.astype(np.float64),
+        life_lost=life_lost,
+        ends=ends,
+        random=np.concatenate([random, coins]),
+        **rest,
+    )

@@ -1,0 +1,272 @@
+"""Playing: what an agent decides, step by step, and where that leads."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.environments import CopyableEnvironments, Environments, NotCopyable, Step
+from trdlab.environments.faults import blamed
+from trdlab.environments.stack import FrameStack
+from trdlab.errors import InputError
+from trdlab.estimator import Estimator
+from trdlab.policies import Policy, ask, greedy, rows
+
+LONGEST = 1_000
+"""Steps after which an episode is no longer played, where nothing else is said."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far some episodes have been played.
+
+    Args:
+        what: what they are played for.
+        finished: how many have ended, or were cut off.
+        episodes: how many there are.
+        steps: how many have been taken in each that goes on.
+    """
+
+    what: str
+    finished: int
+    episodes: int
+    steps: int
+
+
+Watch = Callable[[Progress], None]
+"""Is told how far things are, now and then."""
+
+
+def unwatched(progress: Progress) -> None:
+    """Tells nobody."""
+
+
+def usual_limit(axis: TimeAxis) -> int:
+    """Returns after how many steps an episode is cut off, where nothing else is said.
+
+    That is `LONGEST`, or four horizons if they are longer: an agent that gets stuck would else play
+    on until the environment stops it, in an Atari game after half an hour of play.
+    """
+    return max(LONGEST, 4 * axis.num_steps)
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What an agent expects at B observations, and how likely it takes each action.
+
+    Args:
+        decomposition: `[B, A, N+1]`.
+        probabilities: `[B, A]`.
+    """
+
+    decomposition: RewardDecomposition
+    probabilities: FloatArray
+
+    @property
+    def expected(self) -> FloatArray:
+        """`[B, N+1]`: the mean over the policy's actions."""
+        weights = self.probabilities[:, None]  # [B, 1, A]
+        return np.asarray((weights @ self.decomposition.components)[:, 0])
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """What B episodes do at a step; where one has ended, 0 and nothing random.
+
+    Args:
+        probabilities: `[R, A]`, how likely the policy takes each action where episodes go on.
+        own: `[B]`, the actions drawn from the policy.
+        random: `[B]`, whether a random action is taken in place of it.
+        actions: `[B]`, what is taken.
+    """
+
+    probabilities: FloatArray
+    own: IntArray
+    random: BoolArray
+    actions: IntArray
+
+
+class Playing:
+    """B episodes that a policy plays side by side, one each: the one loop of all who play.
+
+    Whoever plays goes on while episodes are `running`: asks what is expected (`decide`) or only
+    what is done (`turn`), and then takes the step (`take`). The policy is asked once a step. A lone
+    episode is the same with the same seeds, whatever it is played for, and what happens in one
+    episode does not depend on when others end.
+
+    Args:
+        estimator: whose expectations are told; None where nobody asks for them.
+        environments: B of them.
+        rng: of the policy's draws.
+        policy: who acts, where that is not the estimator's greedy policy.
+        epsilon: the chance of a random action in place of the policy's.
+        chance: of the random actions.
+        max_steps: after which an episode is cut off, if not before.
+        stack: what is seen in the midst of episodes that have begun; without it they are reset.
+        memory: what the policy remembers of those.
+
+    Attributes:
+        stack: what is seen.
+        running: `[B]`, which episodes go on.
+        finished: `[B]`, which ones the last step has brought to an end.
+        steps: how many have been taken.
+
+    Raises:
+        InputError: there are fewer than no steps.
+    """
+
+    def __init__(
+        self,
+        estimator: Estimator | None,
+        environments: Environments,
+        rng: np.random.Generator,
+        *,
+        policy: Policy | None = None,
+        epsilon: float = 0.0,
+        chance: np.random.Generator | None = None,
+        max_steps: int | None = None,
+        stack: FrameStack | None = None,
+        memory: Any = None,
+    ) -> None:
+        if max_steps is not None and max_steps < 0:
+            raise InputError(f"An episode has {max_steps} steps.", "Ask for at least 1.")
+        self.environments, self.max_steps, self.steps = environments, max_steps, 0
+        self._begins = stack is None
+        if stack is None:
+            with blamed("when it was reset"):
+                frames = environments.reset()
+            stack = FrameStack(frames, environments.stack, environments.padding)
+        self.stack = stack
+        self.running: BoolArray = np.full(environments.num_envs, max_steps != 0)
+        self.finished: BoolArray = ~self.running
+        self._estimator, self._policy, self._rng = estimator, policy, rng
+        self._epsilon, self._chance = epsilon, chance or rng
+        self._memory, self._asked = memory, np.arange(environments.num_envs)  # [R], whose it is
+        self._decision: Decision | None = None
+        self._turn: Turn | None = None
+        self._last: Any = None
+
+    def decide(self) -> Decision:
+        """Returns what is expected where R episodes go on, and how likely each action is."""
+        if self._decision is None:
+            seen = self.stack.observations[self.running]
+            told = self._told(seen)
+            likely = greedy(told.value) if self._policy is None else self._ask(self._policy, seen)
+            self._decision = Decision(told, likely)
+        return self._decision
+
+    def turn(self) -> Turn:
+        """Returns what is done at this step."""
+        if self._turn is None:
+            if self._estimator is None and self._policy is not None:
+                likely = self._ask(self._policy, self.stack.observations[self.running])
+            else:
+                likely = self.decide().probabilities  # [R, A]
+            count = len(self.running)
+            own = np.zeros(count, dtype=np.int64)
+            own[self.running] = _drawn(likely, self._rng.random(count)[self.running])
+            random, actions = np.zeros(count, dtype=np.bool_), own
+            if self._epsilon:
+                random = self.running & (self._chance.random(count) < self._epsilon)
+                any_action = self._chance.integers(self.environments.num_actions, size=count)
+                actions = np.where(random, any_action, own)
+            self._turn = Turn(likely, own, random, actions)
+        return self._turn
+
+    def take(self, actions: IntArray) -> Step:
+        """Takes a step with these actions `[B]`; where an episode has ended they do not count."""
+        with blamed(f"at step {self.steps + 1} of an episode"):
+            step = self.environments.step(actions, active=self.running)
+        self.steps += 1
+        over = step.ended | (self.steps == self.max_steps)  # [B]
+        self.finished, self.running = self.running & over, self.running & ~over
+        self._last = _last_observations(self.stack, step, self.finished)
+        self.stack.push(step.following, step.ended)
+        self._decision, self._turn, self._begins = None, None, False
+        return step
+
+    def stop(self, where: BoolArray) -> None:
+        """Plays no further `where [B]`."""
+        self.running = self.running & ~where
+
+    def at_last(self) -> Decision:
+        """Returns what is expected at the true last observations of the finished episodes."""
+        told = self._told(self._last)
+        if self._policy is None:
+            return Decision(told, greedy(told.value))
+        memory = rows(self._memory, self.finished[self._asked])
+        nowhere = np.zeros(len(self._last), dtype=np.bool_)
+        return Decision(told, ask(self._policy, self._last, memory, nowhere)[0])
+
+    def branch(
+        self, which: IntArray, *, seed: int, rng: np.random.Generator, max_steps: int
+    ) -> "Playing":
+        """Returns copies of episodes at this step, with what their policy remembers of it.
+
+        The policy has been asked about this step: the first thing to do with copies is to `take`.
+
+        Args:
+            which: `[B′]`, the number of the running episode that each is a copy of.
+            seed: of the copies' own chance.
+            rng: of the policy's draws.
+            max_steps: after which a copy is followed no further.
+
+        Raises:
+            NotCopyable: the environments cannot be copied.
+        """
+        if not can_be_copied(self.environments):
+            raise NotCopyable("The environments cannot be copied.", "Give them a method branch.")
+        self.turn()
+        stack = FrameStack(self.stack.newest[which], self.stack.size, self.stack.padding)
+        stack.frames[:] = self.stack.frames[which]
+        return Playing(
+            self._estimator,
+            self.environments.branch(which, seed),
+            rng,
+            policy=self._policy,
+            max_steps=max_steps,
+            stack=stack,
+            memory=rows(self._memory, np.searchsorted(self._asked, which)),
+        )
+
+    def _told(self, observations: Any) -> RewardDecomposition:
+        if self._estimator is None:
+            raise TypeError("Nobody was given who expects anything.")
+        return self._estimator.decompose(observations)
+
+    def _ask(self, policy: Policy, observations: Any) -> FloatArray:
+        """Returns how likely the policy takes each action `[R, A]`, and lets it remember."""
+        memory = rows(self._memory, self.running[self._asked])
+        self._asked = np.flatnonzero(self.running)
+        begins = np.full(len(self._asked), self._begins)
+        likely, self._memory = ask(policy, observations, memory, begins)
+        return likely
+
+
+def can_be_copied(environments: Environments) -> TypeGuard[CopyableEnvironments]:
+    """Returns whether copies of environments can be asked for; each of them may still refuse."""
+    return hasattr(environments, "branch")
+
+
+def _drawn(probabilities: FloatArray, level: FloatArray) -> IntArray:
+    """Returns `[R]`: the action of each that a level in [0, 1) falls to."""
+    cumulative = probabilities.cumsum(axis=1)
+    level = level * cumulative[:, -1]  # which may not be quite 1
+    return np.asarray((cumulative <= level[:, None]).sum(axis=1))
+
+
+def _last_observations(stack: FrameStack, step: Step, where: BoolArray) -> Any:
+    """Returns `[≤ B, ...]`: the true last observations of the episodes that end `where [B]`.
+
+    Args:
+        stack: what was seen before the step.
+        step: what it led to.
+        where: `[B]`.
+    """
+    frames = step.frames[where]
+    if stack.size is None:
+        return frames
+    return np.concatenate([stack.frames[where, 1:], frames[:, None]], axis=1)

@@ -1,0 +1,141 @@
+"""What followed: the rewards that came after each step, on the time axis of the predictions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.decomposition import TimeAxis
+from trdlab.errors import InputError
+from trdlab.rollouts.episodes import Episode
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Predictions, each with what followed it; M of them, from E episodes.
+
+    Args:
+        time_axis: what the components mean.
+        predicted: `[M, N+1]`, in discounted reward.
+        observed: `[M, N+1]`, in discounted reward; 0 where it is not known.
+        known: `[M, N+1]`, whether what followed is known.
+        episode: `[M]`, the number of the episode of each, in order.
+        num_episodes: E.
+    """
+
+    time_axis: TimeAxis
+    predicted: FloatArray
+    observed: FloatArray
+    known: BoolArray
+    episode: IntArray
+    num_episodes: int
+
+    def __len__(self) -> int:
+        return len(self.predicted)
+
+    def per_episode(self, values: FloatArray) -> FloatArray:
+        """Returns `[E, ...]`: the sums of `values [M, ...]` over each episode."""
+        return per_episode(values, self.episode, self.num_episodes)
+
+
+def per_episode(values: FloatArray, episode: IntArray, num_episodes: int) -> FloatArray:
+    """Returns `[E, ...]`: the sums of `values [M, ...]` by `episode [M]`, which is in order."""
+    bounds = np.searchsorted(episode, np.arange(1, num_episodes))
+    return np.stack([part.sum(axis=0) for part in np.split(values, bounds)])
+
+
+def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
+    """Returns `[T, N+1]` twice: the discounted reward that came, and where that is known.
+
+    With w = 1, component k of step t is γ^k·R_(t+k); a group is the sum of its steps, and the
+    residual is what came later. After an end they are exactly zero. Not known is
+
+    - what a truncation cut off, and in an episode with a `time_limit` every component that reaches
+      beyond it, even where the episode ended in time: otherwise, of the last steps only those that
+      ended would count, and an end would look likelier than it is;
+    - what came after a random action, which the prediction does not speak of;
+    - the residual, unless the episode came to an end; with ε > 0 it is never known. (Of several
+      episodes it is known only if it is of all of their steps, see `pool`.)
+    """
+    axis, total, far = episode.time_axis, len(episode), np.iinfo(np.int64).max
+    steps, starts = np.arange(axis.num_steps), np.arange(total)
+    end = next_flag(episode.ends, far)[:total]  # [T], the step after which nothing comes
+    observed = np.zeros((total, axis.num_components))
+    padded = np.concatenate([episode.rewards, np.zeros(axis.num_steps)])
+    if axis.horizon:
+        windows = np.lib.stride_tricks.sliding_window_view(padded, axis.num_steps)[:total]
+        alive = starts[:, None] + steps <= end[:, None]  # [T, N·w]
+        rewards = np.where(alive, windows, 0.0) * axis.gamma**steps
+        observed[:, :-1] = rewards.reshape(total, axis.horizon, axis.width).sum(axis=2)
+    later = np.concatenate([_returns(episode, axis.gamma), np.zeros(axis.num_steps)])
+    residual = later[starts + axis.num_steps] * axis.gamma**axis.num_steps
+    observed[:, -1] = np.where(starts + axis.num_steps <= end, residual, 0.0)
+
+    beyond = starts[:, None] + axis.width * np.arange(1, axis.num_components)  # [T, N], its end
+    known = (end[:, None] < far) | (beyond <= total)
+    if episode.time_limit is not None:
+        known &= beyond <= episode.time_limit
+    random = np.append(episode.random, False)
+    known &= beyond <= next_flag(random, far)[1 : total + 1, None]
+    known_residual = (end < far) & (episode.epsilon == 0.0)
+    known = np.concatenate([known, known_residual[:, None]], axis=1)
+    return np.where(known, observed, 0.0), known
+
+
+def pool(episodes: Sequence[Episode]) -> Samples:
+    """Returns every step of some episodes as a sample.
+
+    Where the residual of some step is not known, it counts as known of none: the others are those
+    that ended early, from which nothing can be told of those that went on.
+
+    Raises:
+        InputError: there are no episodes, or they are of different time axes.
+    """
+    time_axis = common_axis(episodes)
+    observed, known = zip(*map(what_followed, episodes), strict=True)
+    return Samples(
+        time_axis=time_axis,
+        predicted=np.concatenate([episode.predicted for episode in episodes]).astype(np.float64),
+        observed=np.concatenate(observed),
+        known=all_or_none(np.concatenate(known)),
+        episode=np.repeat(np.arange(len(episodes)), [len(episode) for episode in episodes]),
+        num_episodes=len(episodes),
+    )
+
+
+def all_or_none(known: BoolArray) -> BoolArray:
+    """Returns what is known `[M, N+1]`, of the residual only if it is known of all M."""
+    known = known.copy()
+    known[:, -1] = known[:, -1].all()
+    return known
+
+
+def common_axis(episodes: Sequence[Episode]) -> TimeAxis:
+    """Returns the time axis of some episodes.
+
+    Raises:
+        InputError: there are no episodes, or they are of different time axes.
+    """
+    axes = {episode.time_axis for episode in episodes}
+    if len(axes) != 1:
+        raise InputError(
+            f"There are {len(episodes)} episodes on {len(axes)} time axes.",
+            "Give one episode or more, all of one estimator.",
+        )
+    return axes.pop()
+
+
+def next_flag(flags: BoolArray, nowhere: int) -> IntArray:
+    """Returns, for each place, the first flag there or later; `nowhere` where none comes."""
+    places = np.where(flags, np.arange(len(flags)), nowhere)
+    return np.asarray(np.minimum.accumulate(places[::-1])[::-1])
+
+
+def _returns(episode: Episode, gamma: float) -> FloatArray:
+    """Returns `[T]`: the discounted reward from each step on, up to the next end."""
+    returns, ahead = np.zeros(len(episode)), 0.0
+    for step in reversed(range(len(episode))):
+        ahead = episode.rewards[step] + (0.0 if episode.ends[step] else gamma * ahead)
+        returns[step] = ahead
+    return returns

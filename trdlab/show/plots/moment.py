@@ -1,0 +1,251 @@
+"""What is expected of actions at one moment: bars, what they can be off by, and the difference."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from trdlab.arrays import FloatArray
+from trdlab.decomposition import RewardDecomposition
+from trdlab.estimator import Estimator, Future
+from trdlab.explanations.moment.moment import Moment
+from trdlab.explanations.moment.outcome import Trial
+from trdlab.explanations.moment.steps import doubtful
+from trdlab.formatting import decimals_between, decimals_for
+from trdlab.show.plots import bars, style
+from trdlab.show.plots.bars import Scale, plot_components, scale_of, settled
+from trdlab.tabular import ExactTable
+from trdlab.time_axis import axis_title
+
+__all__ = ["moment_figure", "plot_action", "plot_components", "plot_contrast", "plot_moment"]
+
+Range = tuple[float, float]
+"""The least and the largest value that is possible."""
+ANY: Range = (-np.inf, np.inf)
+PANEL = 1.75
+"""Inches that one row of bars takes."""
+EXPECTED = "expected discounted reward"
+
+
+def moment_figure(
+    moment: Moment,
+    action: str,
+    foil: str | None = None,
+    title: str = "",
+    *,
+    trial: Trial | None = None,
+    possible: Range = ANY,
+) -> Figure:
+    """Returns the picture of an action, or of two and their difference (see `plot_moment`)."""
+    panels = 1 if foil is None else 3
+    figure = style.new_figure(1.6 + PANEL * panels, title)
+    axes = np.atleast_1d(figure.subplots(panels, 1, sharex=True)).tolist()
+    plot_moment(axes, moment, action, foil, trial=trial, possible=possible)
+    figure.supylabel(EXPECTED, fontsize=style.TEXT, color=style.MUTED)
+    explain_marks(figure, moment, action, foil, trial)
+    return figure
+
+
+def plot_moment(
+    axes: Sequence[Axes],
+    moment: Moment,
+    action: str,
+    foil: str | None = None,
+    *,
+    trial: Trial | None = None,
+    possible: Range = ANY,
+) -> Sequence[Axes]:
+    """Draws an action; with a foil, both on one scale, and their difference below them.
+
+    Args:
+        axes: one, or three that share their steps.
+        moment: the decompositions.
+        action: the name of an action.
+        foil: the name of another.
+        trial: what came of the two, where they were tried.
+        possible: the values that a component can have; whiskers end there.
+
+    Returns:
+        `axes`.
+    """
+    names = [action] if foil is None else [action, foil]
+    values = [moment.q_value(name) for name in names]
+    decimals = decimals_for(values) if foil is None else decimals_between(*values)
+    ends = [_ends(moment, name, possible) for name in names]
+    scale = scale_of(np.stack([moment.components(name) for name in names]), *ends)
+    for ax, name, value in zip(axes, names, values, strict=False):
+        plot_action(ax, moment, name, scale=scale, possible=possible)
+        _title(ax, f"{name}: Q = {style.told(value, decimals)}", moment.components(name))
+    if foil is not None:
+        plot_contrast(axes[-1], moment, action, foil, trial=trial)
+        delta = settled(moment.difference(action, foil))
+        gap = style.told(float(delta.sum()), decimals_for([delta.sum()]))
+        _title(axes[-1], f"{action} − {foil}: {gap}", delta)
+    for ax in axes[:-1]:
+        ax.tick_params(labelbottom=False)
+    axes[-1].set_xlabel(style.STEPS)
+    return axes
+
+
+def plot_action(
+    ax: Axes, moment: Moment, action: str, *, scale: Scale | None = None, possible: Range = ANY
+) -> Axes:
+    """Draws what is expected of an action, with whiskers (see `whiskers`).
+
+    What is not to be trusted is pale. Where the episode may end meanwhile, a dotted line is the
+    chance that it is still running, with a scale of its own on the right.
+
+    Args:
+        ax: the axes to draw on.
+        moment: the decompositions, and their uncertainty or error.
+        action: the name of the action.
+        scale: what the axes show; by default all bars of this action.
+        possible: the values that a component can have; whiskers end there.
+
+    Returns:
+        `ax`.
+    """
+    components, ends = moment.components(action), _ends(moment, action, possible)
+    scale = scale_of(components[None], ends) if scale is None else scale
+    colour = style.action_colours(moment.action_names)[action]
+    faded = doubtful(moment, action)
+    plot_components(ax, components, moment.time_axis, colour=colour, scale=scale, faded=faded)
+    if ends is not None:
+        bars.draw_whiskers(ax, style.positions(moment.time_axis), ends, scale)
+    chance = _survival(moment, action)
+    if (chance < 1.0).any():
+        _plot_survival(ax, style.positions(moment.time_axis), chance)
+    return ax
+
+
+def plot_contrast(
+    ax: Axes, moment: Moment, action: str, foil: str, *, trial: Trial | None = None
+) -> Axes:
+    """Draws action minus foil: up, and in the colour of the action, where that pays more.
+
+    Args:
+        ax: the axes to draw on.
+        moment: the decompositions.
+        action: the name of an action.
+        foil: the name of another.
+        trial: of both; what came of their difference is drawn as diamonds.
+
+    Returns:
+        `ax`.
+    """
+    delta, axis = settled(moment.difference(action, foil)), moment.time_axis
+    came = None if trial is None else _came(trial)
+    scale, colours = scale_of(delta[None], came), style.action_colours(moment.action_names)
+    faded = doubtful(moment, action) | doubtful(moment, foil)
+    colour = (colours[action], colours[foil])
+    plot_components(ax, delta, axis, colour=colour, scale=scale, faded=faded)
+    if came is not None:
+        bars.draw_whiskers(ax, style.positions(axis) + 0.2, came[1:], scale, came[0])
+    return ax
+
+
+def explain_marks(
+    figure: Figure, moment: Moment, action: str, foil: str | None, trial: Trial | None = None
+) -> None:
+    """Adds a legend of the marks that are there, and says whose future it is."""
+    names = [action] if foil is None else [action, foil]
+    handles: list[Artist] = [bars.residual_handle()]
+    if any(doubtful(moment, name).any() for name in names):
+        handles.append(bars.faded_handle())
+    if meaning := whiskers(moment):
+        handles.append(bars.handle(f"whiskers: {meaning}"))
+    if any((_survival(moment, name) < 1.0).any() for name in names):
+        label = "chance that the episode is still running"
+        handles.append(bars.handle(label, ":", colour=style.MUTED))
+    if trial is not None:
+        handles.append(bars.handle(f"as it came, each tried {trial.found.copies} times", "", "D"))
+    future, usual = moment.future, Future("")
+    whose = [f"after the first action: {future.policy}"]
+    whose += [future.reward] * (future.reward != usual.reward)
+    whose += [f"ends at {future.ending}"] * (future.ending != usual.ending)
+    style.add_legend(figure, handles, axis_title(moment.time_axis), " · ".join(whose))
+
+
+def whiskers(moment: Moment) -> str:
+    """Returns what the whiskers of a moment mean, empty where there are none."""
+    if not any((_lengths(moment, name) > 0.0).any() for name in moment.action_names):
+        return ""
+    if moment.uncertainty is not None:
+        return "one standard deviation"
+    return "what such forecasts are off by (root mean square)"
+
+
+def without_noise(moment: Moment, error: float) -> Moment:
+    """Returns a moment in which all that is within a proven error is 0, variances too."""
+    told, known = moment.decomposition, moment.uncertainty
+    if known is not None:
+        spread = np.where(known.deviation**2 <= error, 0.0, known.deviation)
+        known = replace(known, deviation=spread)
+    components = settled(told.components, error)
+    return replace(
+        moment,
+        decomposition=RewardDecomposition(components, told.time_axis),
+        uncertainty=known,
+    )
+
+
+def possible_range(estimator: Estimator) -> Range:
+    """Returns the values that components can have: of one sign where all rewards surely are."""
+    if not isinstance(estimator, ExactTable):
+        return ANY
+    rewards = estimator.mdp.rewards
+    return 0.0 if (rewards >= 0.0).all() else ANY[0], 0.0 if (rewards <= 0.0).all() else ANY[1]
+
+
+def _title(ax: Axes, text: str, components: FloatArray) -> None:
+    """Writes the title of bars, above their numbers if there are any."""
+    pad = 20.0 if bars.numbers(settled(components)) else 6.0
+    ax.set_title(text, fontsize=style.TITLE, loc="left", pad=pad)
+
+
+def _survival(moment: Moment, action: str) -> FloatArray:
+    """Returns `[N+1]`: the chance that the episode still runs, 1 where it is not known."""
+    known = moment.uncertainty
+    ones = np.ones(moment.time_axis.num_components)
+    return ones if known is None else np.asarray(known.survival[moment.index(action)])
+
+
+def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:
+    right = ax.twinx()
+    right.step(places, chance, where="mid", color=style.MUTED, linewidth=1.2, linestyle=":")
+    right.set(ylim=(-0.08, 1.2), yticks=(0.0, 0.5, 1.0), yticklabels=("0", "½", "1"))
+    style.tidy(right).tick_params(labelcolor=style.MUTED)
+    right.spines[["left", "bottom"]].set_visible(False)
+    ax.set_zorder(right.get_zorder() + 1)  # the bars stand in front of it
+    ax.patch.set_visible(False)
+
+
+def _lengths(moment: Moment, action: str) -> FloatArray:
+    """Returns `[N+1]`: how long whiskers are, 0 or NaN where there are none."""
+    if moment.uncertainty is not None:
+        return np.asarray(moment.uncertainty.deviation[moment.index(action)])
+    error = moment.error_of(action)
+    return np.zeros(moment.time_axis.num_components) if error is None else error
+
+
+def _ends(moment: Moment, action: str, possible: Range) -> FloatArray | None:
+    """Returns `[2, N+1]`: where whiskers end, NaN where there are none; None if there are none."""
+    means, length = moment.components(action), _lengths(moment, action)
+    if not (length > 0.0).any():
+        return None
+    least, most = possible
+    if moment.only_reward is not None:
+        least, most = (0.0, most) if moment.only_reward > 0.0 else (least, 0.0)
+    low = np.minimum(np.maximum(means - length, least), means)
+    high = np.maximum(np.minimum(means + length, most), means)
+    return np.where(length > 0.0, np.stack([low, high]), np.nan)
+
+
+def _came(trial: Trial) -> FloatArray:
+    """Returns `[3, N+1]`: what came of a difference, and its interval, of no length if unknown."""
+    seen = trial.found.observed
+    rows = np.stack([seen.value, seen.low, seen.high])[:, :-1]
+    return np.where(np.isnan(rows), rows[0], rows)

@@ -22,7 +22,8 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.pixels import pictures
 from trdlab.rollouts.evaluation import evaluate
 from trdlab.tabular import exact
-from trdlab.training.setup import future, new_trainer, resolved
+from trdlab.training.machine import resolved
+from trdlab.training.setup import future, new_trainer
 
 from exercise import check
 

@@ -58,11 +58,10 @@ def _(report: CalibrationReport) -> Document:
 
 @document.register
 def _(comparison: Comparison) -> Document:
-    named = zip(SIDES, comparison.names, strict=True)
-    seconds = comparison.seconds_per_step
+    axis, seconds = axis_words(comparison.time_axis), _seconds(comparison.seconds_per_step)
     return Document(
-        heading=" · ".join(f"{side}: {name}" for side, name in named),
-        setting=(*axis_words(comparison.time_axis), *_seconds(seconds)),
+        heading=" · ".join(comparison.titles),
+        setting=(*axis, *_where(comparison), *seconds),
         grid=_means(comparison),
         answer=tuple(claim.sentence for claim in comparing.in_brief(comparison)),
         sections=comparing.sections(comparison),
@@ -80,6 +79,13 @@ def _played(explanation: Explanation) -> list[str]:
     if explanation.max_steps in cut - {None}:
         words.append(f"episodes are cut off after {explanation.max_steps:,} steps")
     return words
+
+
+def _where(comparison: Comparison) -> list[str]:
+    """Returns where both act, if that has a name."""
+    env, *arguments = comparison.place[1::2] or ("",)
+    made = f" with {', '.join(arguments)}" if arguments else ""
+    return [f"both act in {env}{made}"] if env else []
 
 
 def _seconds(seconds: float | None) -> list[str]:
@@ -150,12 +156,14 @@ def _(comparison: Comparison) -> dict[str, Any]:
         "agents": {
             side: {
                 "name": comparison.names[i],
+                "words": list(comparison.words[i]),
                 "future": comparison.futures[i].to_dict(),
                 "mean": plain_data(_of_side(comparison.means, i)),
                 "calibration": None if report is None else data(report),
             }
             for i, (side, report) in enumerate(zip(SIDES, comparison.reports, strict=True))
         },
+        "place": list(comparison.place),
         "seconds_per_step": comparison.seconds_per_step,
         "max_steps": comparison.max_steps,
         "time_axis": axis_data(comparison.time_axis),
@@ -169,6 +177,7 @@ def _(comparison: Comparison) -> dict[str, Any]:
         "gap": plain_data(comparison.gap),
         "shift": plain_data(comparison.shift),
         "agreement": plain_data(comparison.agreement),
+        "furthest": [_state(comparison, m) for m in visits.furthest(comparing.FURTHEST)],
         "answer": [claim.to_dict() for claim in comparing.in_brief(comparison)],
         "sections": sections_data(comparing.sections(comparison)),
     }
@@ -176,6 +185,22 @@ def _(comparison: Comparison) -> dict[str, Any]:
 
 def _of_side(means: Estimates, side: int) -> Estimates:
     return Estimates(means.value[side], means.low[side], means.high[side])
+
+
+def _state(comparison: Comparison, m: int) -> dict[str, Any]:
+    """Returns a state, and what each of the two would do there and expects of that."""
+    visits, names = comparison.visits, comparison.action_names
+    told = {
+        side: {"action": names[visits.actions[i, m]], "components": visits.expected[i, m].tolist()}
+        for i, side in enumerate(SIDES)
+    }
+    return {
+        "player": SIDES[visits.player[m]],
+        "seed": int(visits.seed[m]),
+        "step": int(visits.step[m]),
+        "distance": float(visits.apart[m]),
+        **told,
+    }
 
 
 def _episode(explanation: Explanation) -> dict[str, Any]:

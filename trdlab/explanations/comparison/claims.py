@@ -207,7 +207,7 @@ def _apart(comparison: Comparison, sign: float) -> Iterator[tuple[FloatArray, in
 
 
 @COMPARISONS.rule(
-    "At {step:step} of {side:text}'s episode with seed {seed:count}: A would do {first_action} and "
+    "At {step:step} of {side:text}'s episode with seed {seed:text}: A would do {first_action} and "
     "expects {first_value:number}, B {second_action} and {second_value:number}."
 )
 def furthest_apart(comparison: Comparison) -> Iterator[Fields]:

@@ -37,7 +37,7 @@ def contrast(choice: Choice) -> list[Claim]:
         return nothing
     worth = every(choice, equal_totals, different_totals, no_total)
     worth += first(choice, better_by_discount, better_against_total, better, equal_values)
-    if alike := first(choice, same_components):
+    if alike := first(choice, same_rewards, same_components):
         return alike + worth
     if doubt := every(choice, untested_difference):
         return worth[-1:] + doubt + worth[:-1]
@@ -54,8 +54,7 @@ def in_brief(choice: Choice) -> list[Claim]:
     """Returns who is ahead and why, and what the discount has to do with it."""
     told = contrast(choice)
     kinds = [claim.kind for claim in told]
-    turn = next((c for c in reversed(told) if c.kind in ("overtakes", "makes-up")), None)
-    brief = told[:1] if turn is None or turn is told[0] else [told[0], turn]
+    brief = told[:1] + [c for c in told[1:] if c.kind in ("overtakes", "makes-up")]
     if {"better-by-discount", "better-against-total"} & set(kinds):
         return brief + [c for c in told if c.kind in _BY_DISCOUNT]
     return brief + [c for c in told if c.kind in ("better", "equal-values") and c not in brief]
@@ -154,7 +153,21 @@ def nothing_on_average(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule("{action} and {foil} lead to the same rewards at the same times{averages:averages}.")
+def same_rewards(choice: Choice) -> Iterator[Fields]:
+    """All that comes is told step by step."""
+    for fields in _alike(choice):
+        row = choice.moment.components(fields["action"])
+        if choice.time_axis.width == 1 and row[-1] == 0.0:
+            yield fields
+
+
+@CHOICES.rule("Nothing in these numbers tells {action} and {foil} apart.")
 def same_components(choice: Choice) -> Iterator[Fields]:
+    if not any(same_rewards(choice)):
+        yield from _alike(choice)
+
+
+def _alike(choice: Choice) -> Iterator[Fields]:
     for action, foil in choice.orders[:1]:
         if not choice.moment.difference(action, foil).any():
             yield {"action": action, "foil": foil, "averages": are_sure(choice)}
@@ -213,7 +226,7 @@ def more_immediate(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "{leader} costs less: {leader_cost:number} {last_step:within}, where {other} costs "
+    "{leader} costs less: {leader_cost:size} {last_step:within}, where {other} costs "
     "{other_cost:number}{averages:averages}."
 )
 def costs_less(choice: Choice) -> Iterator[Fields]:

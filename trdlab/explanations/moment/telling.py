@@ -27,9 +27,9 @@ def in_brief(choice: Choice) -> list[Claim]:
     if choice.moment.is_over:
         return every(choice, episode_is_over)
     told = contrast.in_brief(choice) if choice.foil is not None else every(choice, no_alternative)
-    if told and told[0].kind.startswith("nothing"):
-        return told
     ties = first(choice, tied_actions, tied_later)
+    if told and told[0].kind.startswith("nothing"):
+        return told + ties
     flips = first(choice, sensitivity.flips)
     return list(at_first([*told, *ties, *forecast.forecast(choice)[:1], *flips]))
 

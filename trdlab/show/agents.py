@@ -62,7 +62,7 @@ def _(comparison: Comparison) -> Document:
     return Document(
         heading=" · ".join(comparison.titles),
         setting=(*axis, *_where(comparison), *seconds),
-        grid=_means(comparison),
+        grid=_means(comparison) if comparison.visits.apart.any() else (),
         answer=tuple(claim.sentence for claim in comparing.in_brief(comparison)),
         sections=comparing.sections(comparison),
     )

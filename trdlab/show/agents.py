@@ -1,6 +1,7 @@
 """What is rendered of agents: explanations, calibrations and comparisons, as pages and as data."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison import claims as comparing
 from trdlab.explanations.comparison.comparison import SIDES, Comparison
 from trdlab.explanations.explanation import Explanation
+from trdlab.explanations.moment.moment import Choice
 from trdlab.explanations.rules import plain_data
+from trdlab.explanations.words import counted
 from trdlab.formatting import decimals_for, number
 from trdlab.show.data import actions_data, axis_data, data, sections_data
 from trdlab.show.document import Document, axis_words, document
@@ -38,7 +41,7 @@ def _(explanation: Explanation) -> Document:
         setting=(*axis_words(explanation.time_axis), *_played(explanation)),
         drawing=drawing,
         legend=legend,
-        choice=choice,
+        choice=_shown(explanation),
         answer=tuple(claim.sentence for claim in explanation.answer),
         sections=explanation.sections,
         folded=not explanation.parts,
@@ -68,6 +71,14 @@ def _(comparison: Comparison) -> Document:
     )
 
 
+def _shown(explanation: Explanation) -> Choice | None:
+    """Returns whose actions are shown; the difference of two only to who asks for a contrast."""
+    choice, parts = explanation.choice, explanation.parts
+    if choice is None or not parts or "contrast" in parts:
+        return choice
+    return replace(choice, foil=None)
+
+
 def _played(explanation: Explanation) -> list[str]:
     """Returns how long a step takes, and where episodes were cut off by us."""
     report, story, cut = explanation.report, explanation.story, set()
@@ -77,7 +88,7 @@ def _played(explanation: Explanation) -> list[str]:
         cut.add(story.played.episode.time_limit)
     words = _seconds(explanation.agent.seconds_per_step)
     if explanation.max_steps in cut - {None}:
-        words.append(f"episodes are cut off after {explanation.max_steps:,} steps")
+        words.append(f"episodes are cut off after {counted(explanation.max_steps or 0, 'step')}")
     return words
 
 

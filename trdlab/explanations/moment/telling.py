@@ -42,7 +42,7 @@ def _why(choice: Choice) -> str:
     return (
         f"Why {choice.action}, not {choice.foil}"
         if is_chosen
-        else f"{choice.action} or {choice.foil}"
+        else f"How {choice.action} differs from {choice.foil}"
     )
 
 

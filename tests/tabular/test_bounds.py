@@ -155,3 +155,54 @@ def test_what_is_worth_nothing_is_0(slip: float, rows: str, gamma: float):
         q_values = optimal(world.mdp, gamma, ties=ties).q_values
         assert q_values[0].max() == 0.0
         assert (np.abs(q_values[q_values != 0.0]) > 1e-9).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    SIZES,
+    st.sampled_from(
+        [TimeAxis(0.9, 7), TimeAxis(0.9, 3, 2), TimeAxis(0.5, 0), TimeAxis(0.99, 1, 3)]
+    ),
+)
+def test_the_bound_of_every_component_holds(seed: int, states: int, axis: TimeAxis):
+    mdp = layered(8, states // 8, seed)
+    policy = np.random.default_rng(seed).dirichlet(np.ones(2), mdp.num_states)
+    table = exact(mdp, axis, policy=policy)
+    parts, gamma, chances = [], Fraction(axis.gamma), [[Fraction(p) for p in row] for row in policy]
+
+    def ahead(values: list[list[Fraction]]) -> list[list[Fraction]]:
+        mean = [sum(map(Fraction.__mul__, chances[s], values[s])) for s in range(len(values))]
+        later = [[Fraction(0)] * 2 for _ in values]
+        for s, a, k in zip(
+            mdp.transition_states, mdp.transition_actions, range(len(mdp.rewards)), strict=True
+        ):
+            if not mdp.terminated[k]:
+                later[s][a] += gamma * Fraction(mdp.probabilities[k]) * mean[mdp.next_states[k]]
+        return later
+
+    reward, rest = exact_layers(mdp, 0.0, policy), exact_layers(mdp, axis.gamma, policy)
+    for i in range(axis.num_steps):
+        if i % axis.width == 0:
+            parts.append(reward)
+        else:
+            parts[-1] = [
+                [x + y for x, y in zip(*rows, strict=True)]
+                for rows in zip(parts[-1], reward, strict=True)
+            ]
+        reward, rest = ahead(reward), ahead(rest)
+    for i, part in enumerate([*parts, rest]):
+        for s, row in enumerate(part):
+            for a, right in enumerate(row):
+                error = abs(Fraction(table.decomposition.components[s, a, i]) - right)
+                assert error <= Fraction(table.error_bound[s, a, i])
+
+
+def test_components_that_pay_at_different_steps_differ_however_small_they_are():
+    """Left pays 1e-12 now, right pays twice as much in the next step, at γ = 0.5."""
+    for size in (1e-12, 1.0, 1e12):
+        late = [[(1.0, 0, size, True)], [(1.0, 1, 0.0, False)]]
+        mdp = MDP.from_transitions([late, [[(1.0, 0, 2.0 * size, True)]] * 2])
+        table = exact(mdp, TimeAxis(0.5, 3))
+        assert table.solution.tied[0].all()
+        assert table.ambiguous.tolist() == [True, False]

@@ -7,7 +7,7 @@ import numpy as np
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.tabular.chains import averaging, followed
+from trdlab.tabular.chains import UNIT, averaging, followed
 from trdlab.tabular.mdp import MDP, SMALL
 from trdlab.tabular.solve import Solution
 
@@ -63,6 +63,39 @@ def components(mdp: MDP, solution: Solution, axis: TimeAxis) -> Iterator[FloatAr
             group = group + next(series, nothing)
         yield group
     yield next(series, nothing)
+
+
+def step_bounds(mdp: MDP, solution: Solution, count: int, width: int = 1) -> Iterator[FloatArray]:
+    """Yields how far what `steps` yields can be from the exact values (proven), `[S, A]` each.
+
+    Exact is the future of the solution's own policy. An error is carried on as the reward is, and
+    each step adds what rounding can take, as a share of the sizes that are added up; adding up
+    groups of `width` steps takes some more.
+    """
+    average, longest = averaging(solution.policy), int(np.diff(mdp.offsets).max())
+    rounding = UNIT * (8 + longest + mdp.num_actions)
+
+    def ahead(size: FloatArray, bound: FloatArray) -> tuple[FloatArray, FloatArray]:
+        later = average(size)
+        lost = average(bound) + rounding * later
+        return solution.gamma * mdp.expect(later), solution.gamma * mdp.expect(lost)
+
+    size, bound = np.abs(mdp.expected_rewards), mdp.reward_bound
+    for _ in range(count):
+        yield bound + (width - 1) * UNIT * size
+        size, bound = ahead(size, bound)
+    size, bound = np.abs(solution.q_values), solution.error_bound
+    for _ in range(count):
+        size, bound = ahead(size, bound)
+    yield bound
+
+
+def component_bounds(mdp: MDP, solution: Solution, axis: TimeAxis) -> FloatArray:
+    """Returns `[S, A, N+1]`: how far each component can be from the exact one (proven)."""
+    table = np.zeros((axis.num_components, *mdp.shape))
+    for step, bound in enumerate(step_bounds(mdp, solution, axis.num_steps, axis.width)):
+        table[step // axis.width] += bound  # the rest is that of step N·w
+    return np.moveaxis(table, 0, -1)
 
 
 def decompose(

@@ -68,10 +68,10 @@ def test_each_surprise_has_its_reason():
         place(claim): claim.sentence for claim in tell(changed).moments if "gap" in claim.fields
     }
     assert turns == {
-        0: "After wait at step 0 it expected 0.125 more than before, mainly because what it expects "
-        "after the first 4 steps went from 0 to 0.125.",
-        1: "After wait at step 1 it expected 0.25 less than before, mainly because what it expects "
-        "3 steps later went from 0.25 to 0.",
+        0: "After wait at step 0 it expected 0.125 more than before, mainly because what it "
+        "expects after the first 4 steps went from 0 to 0.125.",
+        1: "After wait at step 1 it expected 0.25 less than before, mainly because what it "
+        "expects 3 steps later went from 0.25 to 0.",
     }
     more = played(foretold([0.0, 0.5]), [0.0, 2.0])
     assert said(tell(more).moments) == [

@@ -229,7 +229,8 @@ def test_what_makes_up_for_a_lead_follows_it():
 def test_crossings_are_found_at_their_step():
     of = pair([0.0, 0.0, 3.0, 0.0], [1.0, 0.5, 0.0, 0.0])
     assert said(of, "overtakes") == [
-        "After the first 3 steps a has overtaken b: added up, it gains 3 and b gains 1.5, on average."
+        "After the first 3 steps a has overtaken b: added up, it gains 3 and b gains 1.5, on "
+        "average."
     ]
 
 

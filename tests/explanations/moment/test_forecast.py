@@ -105,8 +105,8 @@ def test_the_first_cost_is_the_first_step_that_can_cost_something():
     of = chancy(steps)
     assert said(of, "first-reward") == ["With a, the first cost comes at once: it is 0.1."]
     assert said(of, "first-chance") == [
-        "With a, a reward of 2 can come 1 step later at the earliest; the chance that it comes then "
-        "is 50 %."
+        "With a, a reward of 2 can come 1 step later at the earliest; the chance that it comes "
+        "then is 50 %."
     ]
 
 

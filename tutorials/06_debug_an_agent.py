@@ -27,7 +27,8 @@ from trdlab.explanations.calibration.faults import faults
 from trdlab.explanations.moment.sentences import sentence
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
-from trdlab.show.plots.calibration import plot_trust
+from trdlab.show.plots.calibration import plot_trust, trust_handles
+from trdlab.show.plots.style import add_legend
 from trdlab.tabular import exact
 from trdlab.tabular.episodes import ModelEnvironments
 
@@ -260,10 +261,11 @@ for name in ("Ada", "Ben", "Cleo"):
     say_all(reports[name])
 
 # %%
-figure, axes = plt.subplots(2, 2, figsize=(11, 6), layout="constrained")
-for ax, (name, report) in zip(axes.flat, reports.items(), strict=True):
+figure, axes = plt.subplots(4, figsize=(6, 12), layout="constrained")
+for ax, (name, report) in zip(axes, reports.items(), strict=True):
     plot_trust(ax, report)
-    ax.set_title(name, loc="left", fontsize=11, fontweight="bold")
+    ax.set_title(name, loc="right", fontsize=11, fontweight="bold")
+add_legend(figure, trust_handles(reports["Ada"]))
 figure
 
 # %% [markdown]

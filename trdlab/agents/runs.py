@@ -9,6 +9,7 @@ from trdlab.agents.agent import Agent
 from trdlab.agents.models import is_model
 from trdlab.agents.places import Place, Where, find_place, look
 from trdlab.environments.making import check_imported
+from trdlab.environments.naming import is_numbered
 from trdlab.errors import InputError
 from trdlab.rollouts.branches import Copying
 from trdlab.runs.folder import RunFolder
@@ -39,7 +40,7 @@ def run_agent(
         TrdlabError: something is torn.
     """
     from trdlab.training.loading import interface_of, load, run_settings
-    from trdlab.training.setup import use_threads
+    from trdlab.training.machine import use_threads
 
     folder = RunFolder.open(path)
     settings = run_settings(folder)
@@ -48,14 +49,16 @@ def run_agent(
     use_threads(settings)
     estimator = load(path, step)
     place = _place(settings, env, env_arguments)
-    found = look(place.make)
-    interface_of(folder).check_fits(found, place.name)
+    found, known = look(place.make), interface_of(folder)
+    if settings.action_names and env is None:
+        found = found.named(settings.action_names)
+    known.check_fits(found, place.name)
     at = "" if step is None else f"@{step}"
     module = settings.env.rpartition(":")[0]
     return Agent(
         name=f"{folder.path.name}{at}",
         estimator=estimator,
-        action_names=found.action_names,
+        action_names=(known if is_numbered(found.action_names) else found).action_names,
         make=place.make,
         seconds_per_step=found.seconds_per_step,
         origin=place.origin(f"{path}{at}", None, away=env is not None, module=module),

@@ -16,6 +16,8 @@ from trdlab.formatting import percent
 from trdlab.statistics import Estimate
 
 SCHEMA = "trdlab.trust/2"
+MOST_VERDICTS = 4
+"""Of more than so many, only the first and the last are told."""
 LITTLE = 0.1
 """A ceiling below this leaves little to know."""
 WORTH_SAYING = 0.005
@@ -251,8 +253,10 @@ def in_brief(report: CalibrationReport) -> list[Claim]:
 
 
 def _trust(report: CalibrationReport) -> list[Claim]:
-    """Returns the verdicts in short, and that on the residual."""
+    """Returns the verdicts, of many those in short and that on the residual."""
     found = verdicts(report)
+    if len(found) <= MOST_VERDICTS:
+        return found
     return list(dict.fromkeys([*_in_short(found), found[-1]]))
 
 

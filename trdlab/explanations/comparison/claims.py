@@ -66,7 +66,9 @@ def nothing_differs(comparison: Comparison) -> Iterator[Fields]:
         yield {}
 
 
-@COMPARISONS.rule("Both expect {value:number} on average, though not the same everywhere.")
+@COMPARISONS.rule(
+    "Both expect {value:number} on average, though not the same of every action at every state."
+)
 def same_in_all(comparison: Comparison) -> Iterator[Fields]:
     if comparison.gap.value == 0.0 and comparison.visits.of_any_action.any():
         yield {"value": float(values(comparison)[0])}
@@ -111,8 +113,11 @@ def of_any_action(comparison: Comparison) -> Iterator[Fields]:
 
 @COMPARISONS.rule("They would take the same action at {share:percent} of the states.")
 def agreement(comparison: Comparison) -> Iterator[Fields]:
+    """Of two who expect the same everywhere that is said only where they act otherwise."""
     one, other = comparison.visits.actions
-    yield {"share": float((one == other).mean())}
+    share = float((one == other).mean())
+    if share < 1.0 or comparison.visits.of_any_action.any():
+        yield {"share": share}
 
 
 # ---- when --------------------------------------------------------------------------------------
@@ -214,7 +219,7 @@ def _apart(comparison: Comparison, sign: float) -> Iterator[tuple[FloatArray, in
 
 
 @COMPARISONS.rule(
-    "At {step:step} of {side:text}'s episode with seed {seed:count}: A would do {first_action} and "
+    "At {step:step} of {side:text}'s episode with seed {seed:text}: A would do {first_action} and "
     "expects {first_value:number}, B {second_action} and {second_value:number}."
 )
 def furthest_apart(comparison: Comparison) -> Iterator[Fields]:
@@ -244,7 +249,7 @@ def trusted(comparison: Comparison) -> Iterator[Fields]:
     """What matters most of the calibration of each."""
     for side, report in zip(SIDES, comparison.reports, strict=True):
         for claim in [] if report is None else in_brief_of_report(report):
-            yield {"side": side, "said": claim.sentence}
+            yield {"side": side, "said": claim.sentence[0].lower() + claim.sentence[1:]}
 
 
 @COMPARISONS.rule(

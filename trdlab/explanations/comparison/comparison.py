@@ -76,6 +76,14 @@ class Comparison(Printable):
         """What the components mean."""
         return self.visits.time_axis
 
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """Who A and who B is; in full where their names do not tell."""
+        names = self.names
+        if names[0] == names[1] and all(self.words):
+            names = self.words[0][0], self.words[1][0]
+        return tuple(f"{side}: {name}" for side, name in zip(SIDES, names, strict=True))
+
 
 COMPARISONS = Language[Comparison](
     "this comparison", lambda of: forms_of(of.time_axis, of.seconds_per_step)

@@ -78,13 +78,17 @@ class Visits:
         Alike are two whose differences are closer to each other than half of the smaller one.
         """
         found: list[int] = []
-        for m in np.argsort(-self.apart, kind="stable"):
-            if len(found) == count or not self.apart[m]:
+        share = self.apart / (self.apart.max(initial=0.0) or 1.0)
+        share = (
+            np.round(share / _ROUNDING) * _ROUNDING
+        )  # so that rounding does not put them in order
+        for m in np.argsort(-share, kind="stable"):
+            if len(found) == count or not share[m]:
                 break
             closest = (
                 np.abs(self.difference[found] - self.difference[m]).sum(axis=-1).min(initial=np.inf)
             )
-            if closest > 0.5 * self.apart[m]:
+            if closest > (0.5 + _ROUNDING) * self.apart[m]:
                 found.append(int(m))
         return found
 

@@ -120,10 +120,11 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
     if model is not None:
         make = partial(model.environments, time_axis=time_axis)
         return Place(make, str(env) if named else model.name, is_named=named)
+    source: Any = env
     arguments = parse_arguments(env_arguments)
 
     def made(num_envs: int, seed: int) -> GymEnvironments:
-        return GymEnvironments(env, num_envs, seed=seed, env_arguments=arguments)
+        return GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments)
 
     return Place(made, str(env) if named else "the environment", tuple(env_arguments), named)
 

@@ -16,6 +16,7 @@ from matplotlib import pyplot as plt
 from trdlab.decomposition import TimeAxis
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.show.plots.moment import plot_components
+from trdlab.show.plots.style import action_colours
 from trdlab.tabular import WindowBuilder, exact, learn, operator_table
 
 from exercise import check
@@ -63,11 +64,12 @@ for seed in range(3):
 # further training will change anything.
 
 # %%
-figure, axes = plt.subplots(2, sharey=True, figsize=(7, 4), layout="constrained")
-plot_components(axes[0], truth[0, DOWN].components, AXIS, colour="tab:blue")
-plot_components(axes[1], down.components, AXIS, colour="tab:grey")
-axes[0].set_title("down, exact", loc="left")
-axes[1].set_title("down, learned with the loss on the sum", loc="left")
+figure, axes = plt.subplots(2, sharey=True, figsize=(6, 4.2), layout="constrained")
+colour = action_colours(drone.action_names)["down"]
+plot_components(axes[0], truth[0, DOWN].components, AXIS, colour=colour)
+plot_components(axes[1], down.components, AXIS, colour=colour)
+axes[0].set_title("down, exact", loc="left", pad=20)
+axes[1].set_title("down, learned with the loss on the sum", loc="left", pad=20)
 figure
 
 # %% [markdown]

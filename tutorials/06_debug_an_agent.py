@@ -4,7 +4,7 @@
 # Lesson 5 ended with a warning: a good score is no proof that an agent's reward vectors are right.
 # For a game there is no exact table to compare with. But there is what *happens*. In this lesson
 # four teams describe the same autopilot. Three of them made a mistake that programmers really make,
-# each in one line. The score will not tell you who. A **trust report** will, and it will tell you
+# each in one line. The score will not tell you who. A **calibration** will, and it will tell you
 # what to look for in the code.
 #
 # You need [lesson 2](02_derive_it.md) and its law, and some of [lesson 3](03_learn_it.md). Allow
@@ -22,11 +22,13 @@ from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations import assess, explain, moment_at
-from trdlab.explanations.calibration.sentences import trust_sentences
+from trdlab.explanations.calibration.claims import sections
+from trdlab.explanations.calibration.faults import faults
 from trdlab.explanations.moment.sentences import sentence
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
-from trdlab.show.plots.calibration import plot_trust
+from trdlab.show.plots.calibration import plot_trust, trust_handles
+from trdlab.show.plots.style import add_legend
 from trdlab.tabular import exact
 from trdlab.tabular.episodes import ModelEnvironments
 
@@ -221,6 +223,11 @@ def say(texts):
         print(textwrap.indent(textwrap.fill(text, 78), "  "))
 
 
+def say_all(report):
+    """Prints all that a report says."""
+    say(text for section in sections(report) for text in section.sentences)
+
+
 agents = {
     name: agent(name, tables[name], axis) for name, (_, axis) in TEAMS.items()
 }
@@ -242,23 +249,23 @@ for name, of in agents.items():
 reports = {name: assess(of, episodes=300) for name, of in agents.items()}
 
 print("Dora's report says:")
-say(trust_sentences(reports["Dora"]))
+say_all(reports["Dora"])
 
 # %% [markdown]
-# Dora's forecasts are better than a guess at every step. What lies beyond her horizon is told, and
-# how much that is. Nothing in the report speaks of a mistake. She is the one who is right. Now the
-# others:
+# Dora's forecasts are better than a guess at every step. How much comes later than she tells is
+# told, too. Nothing in the report speaks of a mistake. She is the one who is right. Now the others:
 
 # %%
 for name in ("Ada", "Ben", "Cleo"):
     print(f"{name}'s report says:")
-    say(trust_sentences(reports[name]))
+    say_all(reports[name])
 
 # %%
-figure, axes = plt.subplots(2, 2, figsize=(11, 6), layout="constrained")
-for ax, (name, report) in zip(axes.flat, reports.items(), strict=True):
+figure, axes = plt.subplots(4, figsize=(6, 12), layout="constrained")
+for ax, (name, report) in zip(axes, reports.items(), strict=True):
     plot_trust(ax, report)
-    ax.set_title(name, loc="left", fontsize=11, fontweight="bold")
+    ax.set_title(name, loc="right", fontsize=11, fontweight="bold")
+add_legend(figure, trust_handles(reports["Ada"]))
 figure
 
 # %% [markdown]
@@ -271,10 +278,10 @@ figure
 # of one step must be γ^w times component i − 1 of the next. For this it needs no rewards at all.
 #
 # - Ada "expects rewards 1 step too early". All her rewards are there, but in the wrong place.
-# - Ben's components "are discounted by" about 0.95 "and not by γ^w = 0.9025". He groups two steps,
-#   so from one component to the next two steps pass.
-# - Cleo "ignores where episodes end". What she adds there is what is expected at the start of the
-#   next one, all of it. (It is a little more than all, because in her log flights began anywhere.)
+# - Ben "discounts what comes 2 steps later by" about 0.95, "and not by 0.903", which is γ^w. He
+#   groups two steps, so from one component to the next two steps pass.
+# - Cleo "ignores where episodes end". What she adds there is what the start of the next one
+#   promises, all of it. (It is a little more than all, because in her log flights began anywhere.)
 #
 # ## 5. Repair
 #
@@ -309,15 +316,15 @@ REPAIRED = {
 }
 
 
-def faults(name, targets, axis, seed):
+def named(name, targets, axis, seed):
     """Returns the faults that a report names, after learning from a log of its own."""
     table = learn(targets, axis, record(seed))
-    found = assess(agent(name, table, axis), episodes=300, seed=seed).faults
-    return ", ".join(type(fault).__name__ for fault in found) or "none"
+    report = assess(agent(name, table, axis), episodes=300, seed=seed)
+    return ", ".join(fault.kind for fault in faults(report)) or "none"
 
 
 for name, (targets, axis) in REPAIRED.items():
-    print(f"{name:>4}, repaired: {faults(name, targets, axis, seed=0)}")
+    print(f"{name:>4}, repaired: {named(name, targets, axis, seed=0)}")
 
 # %% [markdown]
 # ## 6. Was it luck?
@@ -328,7 +335,7 @@ for name, (targets, axis) in REPAIRED.items():
 # %%
 print("log   " + "".join(f"{name:>16}" for name in TEAMS))
 for seed in range(1, 6):
-    row = [faults(name, *team, seed) for name, team in TEAMS.items()]
+    row = [named(name, *team, seed) for name, team in TEAMS.items()]
     print(f"{seed:3}   " + "".join(f"{found:>16}" for found in row))
 
 # %% [markdown]
@@ -348,11 +355,11 @@ def emil(log, axis, table):
 
 print("Emil's report says:")
 emils = assess(agent("Emil", learn(emil, PAIRS, log), PAIRS), episodes=300)
-say(trust_sentences(emils))
+say_all(emils)
 
 # %% [markdown]
-# No fault is named, and still the report is no good one: the skill is gone after a few steps, and
-# what is expected is half of what comes. Which line is it? That is exercise 6.3.
+# No fault is named, and still the report is no good one: from some step on his forecasts are no
+# better than a guess, and he expects too little. Which line is it? That is exercise 6.3.
 #
 # ## 8. Your own agent
 #
@@ -378,9 +385,8 @@ say(trust_sentences(emils))
 # %% [markdown]
 # ## Your turn
 #
-# **Exercise 6.1.** An agent has γ = 0.9 and groups of w = 4 steps. Its report says that components
-# are discounted by 0.81 from one to the next, and not by γ^w = 0.6561. Which power of γ does its
-# code use?
+# **Exercise 6.1.** An agent has γ = 0.9 and groups of w = 4 steps. Its report says that it
+# discounts what comes 4 steps later by 0.81, and not by 0.656. Which power of γ does its code use?
 
 # %%
 answer_1 = None  # replace with a whole number

@@ -17,6 +17,8 @@ _Table = Sequence[_Item] | Mapping[int, _Item]  # by number: a list, or a dict a
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
+_UNIT = float(np.finfo(np.float64).eps)
+_UNDERFLOW = float(np.finfo(np.float64).smallest_subnormal)
 SMALL = 300
 """States up to which numpy alone is quicker than importing scipy."""
 
@@ -166,8 +168,24 @@ class MDP:
 
     @cached_property
     def expected_rewards(self) -> FloatArray:
-        """`[S, A]`: E[R | s, a]."""
-        return self.per_action(self.probabilities * self.rewards)
+        """`[S, A]`: E[R | s, a]; 0 where its parts cancel to less than rounding can tell from 0."""
+        means, lost = self._summed_rewards
+        return np.where(np.abs(means) <= lost, 0.0, means)
+
+    @cached_property
+    def reward_bound(self) -> FloatArray:
+        """`[S, A]`: how far `expected_rewards` can be from the exact ones (proven)."""
+        means, lost = self._summed_rewards
+        return np.where(np.abs(means) <= lost, 2.0 * lost, lost)
+
+    @cached_property
+    def _summed_rewards(self) -> tuple[FloatArray, FloatArray]:
+        """The sums `[S, A]` of probability times reward, and what rounding can take from them."""
+        parts = self.probabilities * self.rewards
+        means = self.per_action(parts)
+        size = self.per_action(np.abs(parts)) if (parts < 0.0).any() else means
+        longest = int(np.diff(self.offsets).max())
+        return means, (longest + 1) * (_UNIT * size + _UNDERFLOW)
 
     @cached_property
     def leaves_state(self) -> BoolArray:
@@ -205,7 +223,8 @@ class MDP:
             raise InputError("A reward is not a finite number.", "Check the model.")
         other = copy(self)  # with what is derived from the dynamics, but not from the rewards
         object.__setattr__(other, "rewards", rewards)
-        other.__dict__.pop("expected_rewards", None)
+        for name in ("_summed_rewards", "expected_rewards", "reward_bound"):
+            other.__dict__.pop(name, None)
         return other
 
     def per_action(self, per_transition: FloatArray) -> FloatArray:
@@ -230,7 +249,7 @@ def take_rows(matrix: "csr_array", rows: IntArray) -> "csr_array":
     from scipy.sparse import csr_array
 
     length = int(matrix.indptr[1])
-    if not (np.diff(matrix.indptr) == length).all():
+    if not length or not (np.diff(matrix.indptr) == length).all():
         return matrix[rows]
     data, indices = (
         part.reshape(-1, length).take(rows, axis=0).ravel()

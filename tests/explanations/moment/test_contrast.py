@@ -123,13 +123,12 @@ def test_what_depends_on_how_a_tie_was_broken_says_so():
     of = choice("tie")
     assert of.moment.tied == ("left", "right")
     assert said(of, "tied-actions") == [
-        "Left and right are equally good here, but their futures differ: the numbers follow the "
-        "first."
+        "Left and right are equally good here, but pay differently; the agent takes left."
     ]
     assert said(of, "different-totals") == [
-        "In total right pays 20 and left pays 19, with ties broken as here."
+        "In total right brings 20 and left 19, with ties broken as here."
     ]
-    assert "mix them evenly" in said(choice("tie", ties="mixed"), "tied-actions")[0]
+    assert "takes each equally often" in said(choice("tie", ties="mixed"), "tied-actions")[0]
 
 
 def test_ties_in_later_states_are_counted():
@@ -151,17 +150,17 @@ def test_a_loop_has_no_total():
 def test_totals_of_any_size_are_told_apart():
     world = parse_map("X = coin 1e-12 terminal\nY = treasure 4e-12 terminal\n---\nXS..Y")
     of = choice(Gridworld(world), action="left", foil="right")
-    assert said(of, "different-totals") == ["In total right pays 4e-12 and left pays 1e-12."]
+    assert said(of, "different-totals") == ["In total right brings 4e-12 and left 1e-12."]
     large = parse_map("X = coin 1e12 terminal\nY = treasure 1.001e12 terminal\n---\nXSY")
     assert said(choice(Gridworld(large)), "different-totals") == [
-        "In total right pays 1.001e+12 and left pays 1e+12."
+        "In total right brings 1.001e+12 and left 1e+12."
     ]
 
 
 def test_the_discount_is_told_where_it_decides_against_the_total():
     of = choice("tie", TimeAxis(0.9, 1))
-    assert [claim.sentence for claim in in_brief(of)[:2]] == [
-        "In total right pays 20 and left pays 19.",
+    assert [claim.sentence for claim in in_brief(of)[1:3]] == [
+        "In total right brings 20 and left 19.",
         "But each step of waiting makes a reward count 10 % less: left is worth 17.1, right 16.2.",
     ]
     assert not of_kind(of, "never-behind")  # which of them pays when lies in the residual

@@ -249,7 +249,7 @@ def trusted(comparison: Comparison) -> Iterator[Fields]:
     """What matters most of the calibration of each."""
     for side, report in zip(SIDES, comparison.reports, strict=True):
         for claim in [] if report is None else in_brief_of_report(report):
-            yield {"side": side, "said": claim.sentence}
+            yield {"side": side, "said": claim.sentence[0].lower() + claim.sentence[1:]}
 
 
 @COMPARISONS.rule(

@@ -65,7 +65,7 @@ _BY_DISCOUNT = ("different-totals", "better-by-discount", "better-against-total"
 # ---- what is paid in total, and what that is worth now -------------------------------------------
 
 
-@CHOICES.rule("Both pay {total:number} in total{averages:averages}{ties:ties}.")
+@CHOICES.rule("Both bring {total:number} in total{averages:averages}{ties:ties}.")
 def equal_totals(choice: Choice) -> Iterator[Fields]:
     if choice.foil is not None and not is_by_discount(choice):
         a, b = (choice.moment.total(name) for name in (choice.action, choice.foil))
@@ -74,7 +74,8 @@ def equal_totals(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "In total {more} {more_total:pays} and {less} {less_total:pays}{averages:averages}{ties:ties}."
+    "In total {more} brings {more_total:number} and {less} {less_total:number}"
+    "{averages:averages}{ties:ties}."
 )
 def different_totals(choice: Choice) -> Iterator[Fields]:
     for more, less in choice.orders:
@@ -197,12 +198,12 @@ def untested_difference(choice: Choice) -> Iterator[Fields]:
     "{worse_sum:pays}{averages:averages}."
 )
 def decided_at(choice: Choice) -> Iterator[Fields]:
-    """Most of all that differs lies at one explicit component, and speaks for the better action."""
+    """Most of all that differs lies at one component, and speaks for the better action."""
     for fields in better_of(choice):
         a, b = fields["better"], fields["worse"]
         delta = choice.moment.difference(a, b)
         i = int(delta.argmax())
-        if i < choice.time_axis.horizon and delta[i] >= _DECIDES * np.abs(delta).sum():
+        if choice.time_axis.horizon and delta[i] >= _DECIDES * np.abs(delta).sum():
             rows = (choice.moment.components(a), choice.moment.components(b))
             yield {
                 "component": i,

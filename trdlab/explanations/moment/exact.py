@@ -63,7 +63,7 @@ def _totals_differ(totals: FloatArray, tied: BoolArray) -> BoolArray:
     least = np.where(known, totals, np.inf).min(axis=1)
     most = np.where(known, totals, -np.inf).max(axis=1)
     size = np.maximum(np.abs(least), np.abs(most))
-    return (known.sum(axis=1) > 1) & (most - least > _ROUNDING * size)
+    return np.asarray((known.sum(axis=1) > 1) & (most - least > _ROUNDING * size))
 
 
 def _stays(mdp: MDP, state: int) -> tuple[float, ...]:

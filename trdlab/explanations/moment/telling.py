@@ -65,10 +65,12 @@ def no_alternative(choice: Choice) -> Iterator[Fields]:
         yield {"others": tuple(name for name in names if name != choice.action)}
 
 
-@CHOICES.rule("{actions:names} are equally good here, but their futures differ: {told:text}.")
+@CHOICES.rule("{actions:names} are equally good here, but pay differently; the agent {takes:text}.")
 def tied_actions(choice: Choice) -> Iterator[Fields]:
     if choice.moment.tied:
-        yield {"actions": choice.moment.tied, "told": _told_of_ties(choice)}
+        is_mixed = "mixes" in choice.moment.future.policy
+        takes = "takes each equally often" if is_mixed else f"takes {choice.moment.tied[0]}"
+        yield {"actions": choice.moment.tied, "takes": takes}
 
 
 @CHOICES.rule(
@@ -93,8 +95,3 @@ def counted_as(choice: Choice) -> Iterator[Fields]:
 @CHOICES.rule("It looks ahead to {ending:text}.")
 def ended_by(choice: Choice) -> Iterator[Fields]:
     yield {"ending": choice.moment.future.ending}
-
-
-def _told_of_ties(choice: Choice) -> str:
-    is_mixed = "mixes" in choice.moment.future.policy
-    return "the numbers mix them evenly" if is_mixed else "the numbers follow the first"

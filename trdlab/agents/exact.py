@@ -117,5 +117,6 @@ def model_agent(
         make=place.make,
         policy=Memoryless(lambda states: policy[states]),
         world=world,
+        is_away=not place.is_model(solved.mdp),
         copying=_COPYING,
     )

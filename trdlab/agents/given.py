@@ -67,7 +67,9 @@ def _place(env: Any, env_arguments: Sequence[str], estimator: Estimator) -> Plac
 def _moved(agent: Agent, place: Place) -> Agent:
     """Returns an agent that acts somewhere else."""
     agent.interface.check_fits(look(place), place.name)
-    return replace(agent, make=place.make, origin=None)
+    of = agent.estimator
+    is_away = isinstance(of, ExactTable) and not place.is_model(of.mdp)
+    return replace(agent, make=place.make, origin=None, is_away=is_away)
 
 
 def _model_around(table: ExactTable, env: Any) -> Model:

@@ -4,6 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
+import numpy as np
+from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
+
 from trdlab.agents.models import Model, World, find_model, is_model, model_of
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.arguments import parse_arguments, say_arguments
@@ -16,6 +19,8 @@ from trdlab.tabular import MDP
 
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""
+
+_CHANGING_NOTHING = (TimeLimit, OrderEnforcing, PassiveEnvChecker)
 
 AXIS = TimeAxis(0.95, 4)
 """Of an exact table, where nothing is said."""
@@ -87,12 +92,21 @@ class Place:
         name: what it is called.
         env_arguments: what it is made with, as `KEY=VALUE`.
         is_named: whether it can be found again by its name.
+        mdp: the model that it is; None where it carries none.
     """
 
     make: Make
     name: str
     env_arguments: tuple[str, ...] = ()
     is_named: bool = True
+    mdp: MDP | None = None
+
+    def is_model(self, mdp: MDP) -> bool:
+        """Returns whether episodes here go as a model says."""
+        own, names = self.mdp, ("offsets", "next_states", "probabilities", "rewards", "terminated")
+        return own is not None and all(
+            np.array_equal(getattr(own, name), getattr(mdp, name)) for name in names
+        )
 
 
 def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) -> Place:
@@ -117,6 +131,7 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
             lambda num_envs, seed: model.environments(num_envs, seed, time_axis),
             env if isinstance(env, str) else model.name,
             is_named=isinstance(env, str),
+            mdp=model.world.mdp,
         )
     source: Any = env
     arguments = parse_arguments(env_arguments)
@@ -127,7 +142,20 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
         source if isinstance(source, str) else "the environment",
         tuple(env_arguments),
         is_named=isinstance(source, str),
+        mdp=_mdp_of(env),
     )
+
+
+def _mdp_of(env: Any) -> MDP | None:
+    """Returns the model of an environment, unless a wrapper may change what comes of it."""
+    bare = env
+    while isinstance(bare, _CHANGING_NOTHING):
+        bare = bare.env
+    try:
+        found = model_of(bare) if bare is getattr(bare, "unwrapped", None) else None
+    except InputError:  # it carries something else
+        return None
+    return None if found is None else found.world.mdp
 
 
 def as_words(env_arguments: Mapping[str, Any]) -> tuple[str, ...]:

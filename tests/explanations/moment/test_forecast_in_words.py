@@ -69,9 +69,7 @@ def chance_of(rewards: np.ndarray, at: int, percent: str) -> bool:
 def holds(text: str, rewards: np.ndarray) -> bool:
     """Checks what a sentence says of what came after `go`; returns whether it could be read."""
     discounts = GAMMA ** np.arange(STEPS)
-    if found := re.fullmatch(
-        rf"After go the first (reward|cost) comes {WHEN}: {NUMBER}\.", text
-    ):
+    if found := re.fullmatch(rf"After go the first (reward|cost) comes {WHEN}: {NUMBER}\.", text):
         at, sign = step(found[2]), 1.0 if found[1] == "reward" else -1.0
         assert set(np.unique(rewards[:, at])) == {sign * float(found[3])}
         assert not (sign * rewards[:, :at] > 0.0).any()

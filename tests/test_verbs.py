@@ -124,7 +124,7 @@ def test_what_is_no_agent_says_what_is_missing(what, given, message):
 def test_a_notebooks_first_cell_explains_the_drone():
     explained = trdlab.explain("gridworld:drone", episodes=20)
     assert explained.choice.action == "down"
-    assert explained.report.num_episodes == 20
+    assert explained.report.judged.episodes == 20
     one = trdlab.explain(
         "gridworld:drone", step=1, action=3, parts="forecast", episodes=0, horizon=8
     )
@@ -133,7 +133,7 @@ def test_a_notebooks_first_cell_explains_the_drone():
 
 def test_calibration_and_comparison_are_one_call_each():
     report = trdlab.calibrate("gridworld:ledge", episodes=100)
-    assert report.num_episodes == 100
+    assert report.judged.episodes == 100
     assert report.ceiling is not None
     comparison = trdlab.compare(
         "gridworld:ledge", "gridworld:ledge,slip=0.3", episodes=3, gamma=0.9
@@ -197,8 +197,8 @@ def test_what_can_be_there_only_once_is_played_one_after_another():
 
     explained = trdlab.explain(Sure(), env=OnlyOne, episodes=12)
     assert OnlyOne.running == 0
-    assert explained.report.num_episodes == 12
-    assert explained.report.endings.terminated == 12
+    assert explained.report.judged.episodes == 12
+    assert explained.report.judged.terminated == 12
     assert explained.report.calibration.error.value[:3].tolist() == [0.0] * 3
     assert explained.report.ceiling is None
     assert "OnlyOne" in explained.report.lost

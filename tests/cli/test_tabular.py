@@ -121,7 +121,7 @@ def test_the_page(capsys: pytest.CaptureFixture[str]):
     assert "cuts episodes off after 100 steps; the model does not." in out
     assert "[0, 0, 0, 0, 0, 0.77, 0]" in out
     assert "Components sum to Q" in out
-    assert "Down and right have the same components." in text
+    assert "Down and right lead to the same rewards at the same times." in text
 
 
 def test_the_advice_can_be_followed(capsys: pytest.CaptureFixture[str]):

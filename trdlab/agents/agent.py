@@ -30,6 +30,7 @@ class Agent:
         make: makes the environments that it acts in, from their number and a seed.
         policy: who acts, where that is not the estimator's greedy policy.
         world: the model that the estimator is the exact table of; None if it was learned.
+        is_away: whether it acts elsewhere than in that model, so that nothing is certain there.
         seconds_per_step: how long one of its steps takes as people play, if that is known.
         origin: how a user has named it, and where it acts; None if it was given as an object.
         copying: how much is copied of its states, where nothing else is said.
@@ -41,6 +42,7 @@ class Agent:
     make: Make
     policy: Policy | None = None
     world: World | None = None
+    is_away: bool = False
     seconds_per_step: float | None = None
     origin: Origin | None = None
     copying: Copying = Copying()  # noqa: RUF009  it is frozen

@@ -87,5 +87,6 @@ def model_agent(
         make=place.make,
         policy=Memoryless(lambda states: policy[states]),
         world=world,
+        is_away=not place.is_model(solved.mdp),
         copying=Copying(episodes=100),
     )

@@ -64,7 +64,9 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
 def _moved(agent: Agent, place: Place) -> Agent:
     """Returns an agent that acts somewhere else."""
     agent.interface.check_fits(look(place.make), place.name)
-    return replace(agent, make=place.make, origin=None)
+    of = agent.estimator
+    is_away = isinstance(of, ExactTable) and not place.is_model(of.mdp)
+    return replace(agent, make=place.make, origin=None, is_away=is_away)
 
 
 def _model_around(table: ExactTable, env: Any) -> Model:

@@ -6,6 +6,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Self
 
+import numpy as np
+from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
+
 from trdlab.agents.models import Model, World, find_model, is_model, model_of
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.arguments import parse_arguments
@@ -18,6 +21,8 @@ from trdlab.tabular import MDP
 
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""
+
+_CHANGING_NOTHING = (TimeLimit, OrderEnforcing, PassiveEnvChecker)
 
 AXIS = TimeAxis(0.95, 4)
 """Of an exact table, where nothing is said."""
@@ -87,12 +92,21 @@ class Place:
         name: what it is called.
         env_arguments: what it is made with, as `KEY=VALUE`.
         is_named: whether it can be found again by its name.
+        mdp: the model that it is; None where it carries none.
     """
 
     make: Make
     name: str
     env_arguments: tuple[str, ...] = ()
     is_named: bool = True
+    mdp: MDP | None = None
+
+    def is_model(self, mdp: MDP) -> bool:
+        """Returns whether episodes here go as a model says."""
+        own, names = self.mdp, ("offsets", "next_states", "probabilities", "rewards", "terminated")
+        return own is not None and all(
+            np.array_equal(getattr(own, name), getattr(mdp, name)) for name in names
+        )
 
     def origin(self, agent: str, axis: TimeAxis | None, **how: Any) -> Origin | None:
         """Returns how an agent that acts here is named; None where the place has no name."""
@@ -119,14 +133,28 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
         model = find_model(env)
     if model is not None:
         make = partial(model.environments, time_axis=time_axis)
-        return Place(make, str(env) if named else model.name, is_named=named)
+        called = str(env) if named else model.name
+        return Place(make, called, is_named=named, mdp=model.world.mdp)
     source: Any = env
     arguments = parse_arguments(env_arguments)
 
     def made(num_envs: int, seed: int) -> GymEnvironments:
         return GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments)
 
-    return Place(made, str(env) if named else "the environment", tuple(env_arguments), named)
+    called = str(env) if named else "the environment"
+    return Place(made, called, tuple(env_arguments), named, _mdp_of(env))
+
+
+def _mdp_of(env: Any) -> MDP | None:
+    """Returns the model of an environment, unless a wrapper may change what comes of it."""
+    bare = env
+    while isinstance(bare, _CHANGING_NOTHING):
+        bare = bare.env
+    try:
+        found = model_of(bare) if bare is getattr(bare, "unwrapped", None) else None
+    except InputError:  # it carries something else
+        return None
+    return None if found is None else found.world.mdp
 
 
 def refuse_arguments(name: str, env_arguments: Sequence[str]) -> None:

@@ -191,7 +191,7 @@ def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:
 
 def moment_of_play(agent: Agent, playing: Playing) -> Moment:
     """Returns what the agent expects where the first of its episodes stands."""
-    if agent.world is not None and isinstance(agent.estimator, ExactTable):
+    if agent.world is not None and isinstance(agent.estimator, ExactTable) and not agent.is_away:
         return exact_moment(agent.world, agent.estimator, int(playing.stack.observations[0]))
     decision = playing.decide()
     # findings compare sums, and float32 sums differ in order

@@ -16,7 +16,7 @@ from trdlab.estimator import Estimator
 from trdlab.policies import Policy
 from trdlab.rollouts.branches import Copying
 from trdlab.rollouts.episodes import Episode, Recording, collect
-from trdlab.rollouts.playing import Progress, Watch, unwatched
+from trdlab.rollouts.playing import Watch, part_of, unwatched
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +77,9 @@ class Agent:
             how: else, as for `collect`.
         """
         played: tuple[Episode, ...] = ()
-
-        def tell(progress: Progress) -> None:
-            watch(replace(progress, finished=len(played) + progress.finished, episodes=count))
-
         for batch, environments in enumerate(in_batches(self.make, count, seed)):
             own = int(np.random.SeedSequence([seed, batch]).generate_state(1)[0]) if batch else seed
+            tell = part_of(watch, len(played), count)
             played += collect(
                 self.estimator, environments, policy=self.policy, seed=own, watch=tell, **how
             )

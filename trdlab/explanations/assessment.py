@@ -1,6 +1,5 @@
 """Assessing an agent: its episodes are played, and what it expected is judged by what came."""
 
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 
@@ -19,8 +18,8 @@ from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.outcome import Trial
 from trdlab.rollouts.branches import Branches, Branching, Copying, TooFewMoments
 from trdlab.rollouts.counterfactual import compared, try_actions
-from trdlab.rollouts.episodes import Episode
-from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
+from trdlab.rollouts.episodes import Episode, distinct
+from trdlab.rollouts.playing import Playing, Watch, part_of, unwatched
 from trdlab.statistics import FEWEST_EPISODES
 from trdlab.tabular import ExactTable
 
@@ -112,27 +111,22 @@ class _Judging:
         """
         first = min(self.episodes, max(FEWEST_EPISODES, round(_FIRST * self.episodes)))
         played = self.played(0.0, first)
-        if self.episodes > first and len(_different(played)) > 1:
+        if self.episodes > first and len(distinct(played)) > 1:
             played += self.played(0.0, before=first)
-        different = _different(played)
+        different = distinct(played)
         alike = len(different) < min(FEWEST_EPISODES, self.episodes)
         return (different if alike else played), alike
 
     def played(
-        self, epsilon: float, count: int | None = None, *, before: int = 0
+        self, epsilon: float, end: int | None = None, before: int = 0
     ) -> tuple[Episode, ...]:
-        """Returns `count` episodes, or all but those that have been played `before`."""
-
-        def tell(progress: Progress) -> None:
-            done = progress.finished + before
-            self.watch(replace(progress, finished=done, episodes=self.episodes))
-
+        """Returns the episodes up to the `end` of them, but for those that were played `before`."""
         return self.agent.play(
-            self.episodes - before if count is None else count,
+            (end or self.episodes) - before,
             seed=self.seed + 3 * (before > 0),  # the two seeds between are of the copies
             epsilon=epsilon,
             max_steps=self.max_steps,
-            watch=tell,
+            watch=part_of(self.watch, before, self.episodes),
             what="episodes with some random actions" if epsilon else "episodes to judge by",
         )
 
@@ -143,9 +137,10 @@ class _Judging:
         `every`.
         """
         agent, seed = self.agent, self.seed + 1 + foils
+        branching = Branching(agent.estimator, agent.policy, copying.copies)
         try:
             with closing(agent.make(copying.episodes, seed)) as environments:
-                return Branching(agent.estimator, agent.policy, copying.copies).along(
+                return branching.along(
                     environments,
                     every=every,
                     epsilon=epsilon,
@@ -158,14 +153,6 @@ class _Judging:
             if every == 1:
                 raise
             return self.copied(copying, epsilon, every // 2, foils=foils)
-
-
-def _different(episodes: Sequence[Episode]) -> tuple[Episode, ...]:
-    """Returns the episodes that are not the same as one before."""
-    found: dict[tuple[bytes, ...], Episode] = {}
-    for e in episodes:
-        found.setdefault((e.actions.tobytes(), e.rewards.tobytes(), e.expected.tobytes()), e)
-    return tuple(found.values())
 
 
 def usual_episodes(agent: Agent) -> int:

@@ -1,5 +1,6 @@
 """Episodes: what an agent predicted at every step, and what then happened."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -200,3 +201,11 @@ def collect(
     recording = Recording(estimator, environments, **how)
     recording.play(watch=watch, what=what)
     return recording.episodes()
+
+
+def distinct(episodes: Sequence[Episode]) -> tuple[Episode, ...]:
+    """Returns the episodes that are not the same as one before."""
+    found: dict[tuple[bytes, ...], Episode] = {}
+    for e in episodes:
+        found.setdefault((e.actions.tobytes(), e.rewards.tobytes(), e.expected.tobytes()), e)
+    return tuple(found.values())

@@ -1,7 +1,7 @@
 """Playing: what an agent decides, step by step, and where that leads."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,11 @@ Watch = Callable[[Progress], None]
 
 def unwatched(progress: Progress) -> None:
     """Tells nobody."""
+
+
+def part_of(watch: Watch, before: int, episodes: int) -> Watch:
+    """Returns who is told of episodes as a part of more, some of which were played before."""
+    return lambda now: watch(replace(now, finished=before + now.finished, episodes=episodes))
 
 
 def usual_limit(axis: TimeAxis) -> int:

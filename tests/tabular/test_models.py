@@ -342,6 +342,8 @@ def spoilt(value: float) -> np.ndarray:
         (([sp.eye_array(2), sp.eye_array(3)], GOOD), "sparse matrices of shapes (2, 2), (3, 3)"),
         ((GOOD, GOOD[0]), "The rewards have shape (3, 2), the transitions are of 2 states and 3"),
         ((GOOD, GOOD[..., 0], GOOD[0]), "The terminated have shape (3, 2)"),
+        ((GOOD, GOOD[..., 0], [0.0, np.nan]), "told by nan. Give True or False"),
+        ((GOOD, GOOD[..., 0], GOOD / 2.0), "told by 0.25. Give True or False"),
         ((GOOD, sp.csr_array((2, 3))), "The rewards have shape (2, 3)"),
         ((GOOD, 1.0), "The rewards have shape ()"),
         (([["x"]], GOOD), "The transitions are no array of numbers: could not convert"),
@@ -483,3 +485,14 @@ def test_the_table_works_in_the_wrapper_and_in_explanations():
     for state in range(16):
         explanation = explain(tabular_moment(table, state, world.action_names))
         assert check(" ".join(sentences(explanation)), explanation)
+
+
+def test_a_table_in_single_precision_is_accepted_and_said():
+    class Thirds(gym.Env):
+        P: ClassVar[Any] = [[[(np.float32(1 / 3), i, float(i), i == 2) for i in range(3)]]] * 3
+
+    world = tabular_world(Thirds())
+    (note,) = world.notes
+    assert note == "Probabilities come in single precision: 3 rows were divided by their sum."
+    assert exact(world.mdp, TimeAxis(0.5, 1)).solution.q_values[0, 0] == pytest.approx(1.5)
+    assert tabular_world(gym.make("Taxi-v4")).notes == ()

@@ -157,8 +157,7 @@ def evaluate(
     if as_json:
         common.print_json(result.to_dict())
     else:
-        console, ascii_only = common.new_console()
-        console.print(evaluation_page(result, ascii_only=ascii_only))
+        common.print_text(evaluation_page(result))
     _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
 
 
@@ -174,18 +173,17 @@ def runs(
 ) -> None:
     """List the runs in a folder: what they learn, how far they are, and their score."""
     from trdlab.runs import list_runs
-    from trdlab.show.training import runs_table
+    from trdlab.show.training import runs_page
 
     if plot is not None:
         from trdlab.show.plots.style import check_picture
 
         check_picture(plot, overwrite=overwrite)
-    console, ascii_only = common.new_console()
     found = list_runs(folder)
     if not found:
-        console.print(f"There are no runs in '{folder}'.", soft_wrap=True, markup=False)
+        _say(common.new_console()[0], f"There are no runs in '{folder}'.")
         return
-    console.print(runs_table(found, ascii_only=ascii_only))
+    common.print_text(runs_page(found))
     if plot is not None:
         from trdlab.show.plots.style import save
         from trdlab.show.plots.training import curves_figure
@@ -210,9 +208,7 @@ def _train(
     if dry_run:
         from trdlab.show.training import plan_page
 
-        console, ascii_only = common.new_console()
-        page = plan_page(plan(settings), ascii_only=ascii_only)
-        console.print(page, soft_wrap=True)  # so that the configuration can be copied
+        common.print_text(plan_page(plan(settings)))
         return
     _carry_on(lambda: begin(settings, out))
 

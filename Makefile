@@ -25,13 +25,14 @@ unit: $(VENV)/installed-tests
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2  # one thread for each worker
 
 docs: $(VENV)/installed-tests
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo 'Open site/index.html in a browser.'
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/startup.py
 
 clean:
-	rm -rf $(VENV) site
+	rm -rf $(VENV) .cache site
 
 $(VENV)/python: constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "trdlab needs Python 3.11 or newer; try: make PYTHON=python3.12 $(MAKECMDGOALS)")'

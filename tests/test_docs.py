@@ -29,7 +29,11 @@ def _load(name: str) -> ModuleType:
     return module
 
 
-hooks, docstrings = _load("hooks"), _load("docstrings")
+kept = _load("kept")
+with pytest.MonkeyPatch.context() as patch:
+    patch.setitem(sys.modules, "kept", kept)
+    hooks = _load("hooks")
+lesson_of, docstrings = _load("lesson"), _load("docstrings")
 
 Page = tuple[str, dict[str, bytes]]
 
@@ -44,23 +48,23 @@ def lesson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], P
     def page(source: str) -> Any:
         script = folder / "03_try.py"
         script.write_text(source, encoding="utf-8")
-        return hooks.lesson_page(script)
+        return lesson_of.lesson_page(script)
 
     return page
 
 
 def test_cells_are_prose_or_code_and_know_their_line() -> None:
     source = "import os\n\n# %% [markdown]\n# # Title\n#\n# Text.\n\n# %% a name\n\nx = 1\n\n# %%\n"
-    assert list(hooks.split_cells(source)) == [
-        hooks.Cell("import os", 1, is_prose=False),
-        hooks.Cell("# Title\n\nText.", 4, is_prose=True),
-        hooks.Cell("x = 1", 10, is_prose=False),
+    assert list(lesson_of.split_cells(source)) == [
+        lesson_of.Cell("import os", 1, is_prose=False),
+        lesson_of.Cell("# Title\n\nText.", 4, is_prose=True),
+        lesson_of.Cell("x = 1", 10, is_prose=False),
     ]
 
 
 def test_a_script_without_markers_is_one_cell() -> None:
-    assert list(hooks.split_cells("x = 1\n")) == [hooks.Cell("x = 1", 1, is_prose=False)]
-    assert list(hooks.split_cells("")) == []
+    assert list(lesson_of.split_cells("x = 1\n")) == [lesson_of.Cell("x = 1", 1, is_prose=False)]
+    assert list(lesson_of.split_cells("")) == []
 
 
 def test_prose_stays_prose_and_output_follows_its_code(lesson: Callable[[str], Page]) -> None:
@@ -120,15 +124,86 @@ def test_figures_become_pictures(lesson: Callable[[str], Page], cell: str, count
 def test_an_error_names_script_and_line(
     lesson: Callable[[str], Page], source: str, message: str
 ) -> None:
-    with pytest.raises(PluginError, match=re.escape(f"tutorials/03_try.py, {message}")):
+    with pytest.raises(lesson_of.LessonError, match=re.escape(f"tutorials/03_try.py, {message}")):
         lesson(source)
 
 
 def test_a_failing_lesson_leaves_the_path_as_it_was(lesson: Callable[[str], Page]) -> None:
     before = list(sys.path)
-    with pytest.raises(PluginError):
+    with pytest.raises(lesson_of.LessonError):
         lesson("# %%\n1 / 0\n")
     assert sys.path == before
+
+
+@pytest.fixture
+def counting(tmp_path: Path) -> tuple[Path, Path]:
+    """Returns a lesson that leaves a mark each time it is run, and the file of the marks."""
+    marks, script = tmp_path / "marks", tmp_path / "tutorials" / "03_try.py"
+    script.parent.mkdir()
+    (script.parent / "exercise.py").write_text("")
+    script.write_text(f"# %%\nopen({str(marks)!r}, 'a').write('|')\nprint('hello')\n")
+    return script, marks
+
+
+def test_a_lesson_is_run_again_only_if_its_sources_have_changed(
+    counting: tuple[Path, Path], tmp_path: Path
+) -> None:
+    (script, marks), cache = counting, tmp_path / "cache"
+    page = hooks.lesson(script, cache)
+    assert b"hello" in page["page.md"]
+    assert hooks.lesson(script, cache) == page
+    assert marks.read_text() == "|"
+    (script.parent / "exercise.py").write_text("# another\n")
+    assert hooks.lesson(script, cache) == page
+    assert marks.read_text() == "||"
+    assert len(list(cache.iterdir())) == 1  # what is out of date is gone
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", None], ids=["empty", "no archive", "cut"])
+def test_a_torn_result_is_made_again(
+    counting: tuple[Path, Path], tmp_path: Path, content: bytes | None
+) -> None:
+    (script, marks), cache = counting, tmp_path / "cache"
+    page = hooks.lesson(script, cache)
+    [file] = cache.iterdir()
+    file.write_bytes(file.read_bytes()[:-30] if content is None else content)
+    assert hooks.lesson(script, cache) == page
+    assert marks.read_text() == "||"
+
+
+def test_a_changed_byte_in_a_result_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "a-1.zip"
+    kept.keep(path, {"page.md": b"0123456789" * 9})
+    whole = path.read_bytes()
+    assert kept.kept(path) == {"page.md": b"0123456789" * 9}
+    for place in range(30, 60):  # in the name or in the content
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        assert kept.kept(path) in (None, {"page.md": b"0123456789" * 9})
+
+
+def test_what_changes_while_it_is_made_is_not_kept(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_text("1")
+
+    def make() -> dict[str, bytes]:
+        source.write_text("2")
+        return {"a": b""}
+
+    kept.made(tmp_path / "cache", "a", lambda: kept.fingerprint(source), make)
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_failing_lesson_says_where_and_is_not_kept(
+    counting: tuple[Path, Path], tmp_path: Path
+) -> None:
+    script, _ = counting
+    script.write_text("# %%\nimport os\n1 / 0\n")
+    with pytest.raises(PluginError, match=r"^tutorials/03_try\.py, line 3: ZeroDivisionError"):
+        hooks.lesson(script, tmp_path / "cache")
+    script.write_text("# %%\nimport os\nos._exit(7)\n")
+    with pytest.raises(PluginError, match=r"^03_try\.py: exit code 7$"):
+        hooks.lesson(script, tmp_path / "cache")
+    assert not (tmp_path / "cache").exists()
 
 
 def test_examples_become_code_and_errata_rows_links() -> None:
@@ -162,6 +237,18 @@ def test_signatures_show_the_default_of_a_setting_and_no_more() -> None:
     init = package["Settings.__init__"]
     docstrings.Docstrings().on_object(obj=init)
     assert [str(of.default) for of in init.parameters][1:] == ["1", "f(2)"]
+
+
+def test_a_named_tuple_is_shown_with_its_signature(tmp_path: Path) -> None:
+    griffe = pytest.importorskip("griffe")
+    (tmp_path / "pair.py").write_text(
+        "from typing import NamedTuple\n"
+        "class Pair(NamedTuple):\n    left: int\n    right: int = 2\n"
+    )
+    extensions = griffe.load_extensions(docstrings.Docstrings())
+    package = griffe.load("pair", search_paths=[tmp_path], extensions=extensions)
+    shown = [(str(of.name), of.default) for of in package["Pair"].parameters]
+    assert shown == [("self", None), ("left", None), ("right", "2")]
 
 
 README, TRAIN = (ROOT / "README.md", ROOT / "docs" / "train.md")
@@ -300,3 +387,4 @@ def test_a_command_that_fails_on_a_page_fails_the_build(
     done = build(tmp_path / "mkdocs.yml", tmp_path / "site")
     assert (done.returncode == 0) == ok, done.stderr
     assert ok or "trdlab nonsense" in done.stderr
+    assert len(list((tmp_path / ".cache").rglob("*.zip"))) == ok

@@ -54,11 +54,11 @@ def prepared(docstring: str) -> str:
     """Returns a docstring in the Markdown that the pages need.
 
     >>> prepared("Counts from 0 (errata P8).")
-    'Counts from 0 (errata [P8](../errata.md#p8)).'
+    'Counts from 0 (errata [P8][p8]).'
     """
     fenced = _EXAMPLE.sub(lambda example: f"```pycon\n{example[0]}\n```", docstring)
     return _ERRATA.sub(lambda found: _ROW.sub(_link, found[0]), fenced)
 
 
 def _link(row: re.Match[str]) -> str:
-    return f"[{row[0]}](../errata.md#{row[0].lower()})"
+    return f"[{row[0]}][{row[0].lower()}]"  # a heading of errata.md, from any page

@@ -19,6 +19,7 @@ from time import perf_counter
 from typing import Any
 
 import markdown_exec
+from catalogue import expanded
 from kept import Files, fingerprint, made
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
@@ -30,6 +31,7 @@ DOCS = Path(__file__).parent
 _FROM_THE_NETWORK = re.compile(
     r'<(?:script|img|iframe)[^>]* src="https?:[^"]*|<link[^>]* href="https?:[^"]*'
 )
+_PLAIN = {"NO_COLOR": "1", "COLUMNS": "80", "MPLBACKEND": "agg"}
 _SLOW = 2.0
 """Seconds after which it is told what took them."""
 
@@ -39,7 +41,7 @@ _log = logging.getLogger("mkdocs.hooks.trdlab")
 def on_startup(**_: Any) -> None:
     """Lets pages run the `trdlab` of this environment, printing plain text of one width."""
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    os.environ |= {"NO_COLOR": "1", "COLUMNS": "80", "MPLBACKEND": "agg"}
+    os.environ |= _PLAIN
 
 
 def on_config(config: MkDocsConfig) -> None:
@@ -71,9 +73,13 @@ def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
     return files
 
 
-def on_page_markdown(markdown: str, page: Page, **_: Any) -> None:
-    """Notes when the work on a page begins."""
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
+    """Fills in the lists of a page, and notes when the work on it begins."""
     page.meta["begun"] = perf_counter()
+    try:
+        return expanded(markdown, _package().parent)
+    except LookupError as error:
+        raise PluginError(f"{page.file.src_uri}: {error}") from error
 
 
 def on_page_content(html: str, page: Page, **_: Any) -> None:
@@ -102,7 +108,9 @@ def lesson(script: Path, cache: Path) -> Files:
     """
 
     def hashed() -> str:
-        return fingerprint(script, script.parent / "exercise.py", DOCS / "lesson.py", *_sources())
+        return fingerprint(
+            script, script.parent / "exercise.py", DOCS / "lesson.py", str(_PLAIN), _package()
+        )
 
     def make() -> Files:
         _log.info("Lesson %s: running", script.stem)
@@ -154,15 +162,15 @@ def command_output(code: str, returncode: int, cache: Path) -> str:
         return {"output.txt": done.stdout.encode()}
 
     thing = f"command-{sha256(f'{folder} {code}'.encode()).hexdigest()[:16]}"
-    files = made(cache, thing, lambda: fingerprint(code, *own, *_sources()), make)
+    files = made(cache, thing, lambda: fingerprint(code, *own, str(_PLAIN), _package()), make)
     return files["output.txt"].decode()
 
 
-def _sources() -> list[Path]:
-    """Returns this file, and the folder of the package that the pages are about."""
+def _package() -> Path:
+    """Returns the folder of the package that the pages are about, wherever it was found."""
     spec = find_spec("trdlab")
-    folders = (spec and spec.submodule_search_locations) or ()
-    return [Path(__file__), *map(Path, folders)]
+    [folder] = (spec and spec.submodule_search_locations) or [""]
+    return Path(folder)
 
 
 def _cache(config: MkDocsConfig) -> Path:

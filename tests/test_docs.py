@@ -211,7 +211,7 @@ def test_examples_become_code_and_errata_rows_links() -> None:
         "A sum (errata P1, C5). P2.\n\n>>> f(1)\n2\n>>> f(2)\n\nArgs:\n    x: it."
     )
     assert prepared == (
-        "A sum (errata [P1](../errata.md#p1), [C5](../errata.md#c5)). P2.\n\n"
+        "A sum (errata [P1][p1], [C5][c5]). P2.\n\n"
         "```pycon\n>>> f(1)\n2\n>>> f(2)\n```\n\nArgs:\n    x: it."
     )
 

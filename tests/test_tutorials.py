@@ -1,5 +1,6 @@
 """The lessons run as a new user runs them, and their exercises know right from wrong."""
 
+import ast
 import importlib.util
 import re
 import shutil
@@ -121,6 +122,15 @@ def test_lesson_accepts_the_solutions(lesson: Path, tmp_path: Path) -> None:
 )
 def test_lesson_prints_the_same_each_time(lesson: Path, tmp_path: Path) -> None:
     assert run(lesson, tmp_path) == printed_by(lesson)
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.stem)
+def test_a_notebook_shows_each_figure_once_and_nothing_else(lesson: Path) -> None:
+    """Notebooks show what pyplot has drawn; and the value of a cell's last line beside it."""
+    for cell in re.split(r"^# %%.*$", lesson.read_text(encoding="utf-8"), flags=re.MULTILINE):
+        if "plt.subplots" in cell:
+            last = ast.parse(cell).body[-1]
+            assert not isinstance(last, ast.Expr) or "set_yscale" in ast.unparse(last)
 
 
 def test_first_lesson_shows_the_numbers_of_the_paper() -> None:

@@ -40,8 +40,7 @@ print("\n".join(world.grid.rows))
 
 # %%
 figure, ax = plt.subplots(figsize=(4, 2.4), layout="constrained")
-draw_map(ax, world, state=0)
-figure
+_ = draw_map(ax, world, state=0)
 
 # %% [markdown]
 # The drone decides once, in its first step. Both routes take five steps, and both pay 4.
@@ -124,9 +123,8 @@ print(f"down: components sum to {down.components.sum():.4f}, Q = {q_down:.4f}")
 figure, axes = plt.subplots(2, sharey=True, figsize=(7, 4), layout="constrained")
 plot_components(axes[0], up.components, table.time_axis, colour="tab:orange")
 plot_components(axes[1], down.components, table.time_axis, colour="tab:blue")
-axes[0].set_title("up", loc="left")
-axes[1].set_title("down", loc="left")
-figure
+for ax, name in zip(axes, ("up", "down"), strict=True):
+    ax.set_title(name, loc="left")
 
 # %% [markdown]
 # ## Read the rewards themselves

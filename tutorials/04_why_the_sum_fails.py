@@ -66,9 +66,10 @@ for seed in range(3):
 figure, axes = plt.subplots(2, sharey=True, figsize=(7, 4), layout="constrained")
 plot_components(axes[0], truth[0, DOWN].components, AXIS, colour="tab:blue")
 plot_components(axes[1], down.components, AXIS, colour="tab:grey")
-axes[0].set_title("down, exact", loc="left")
-axes[1].set_title("down, learned with the loss on the sum", loc="left")
-figure
+for ax, how in zip(
+    axes, ("exact", "learned with the loss on the sum"), strict=True
+):
+    ax.set_title(f"down, {how}", loc="left")
 
 # %% [markdown]
 # ### Where it ends

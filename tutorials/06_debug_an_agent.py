@@ -258,7 +258,6 @@ figure, axes = plt.subplots(2, 2, figsize=(11, 6), layout="constrained")
 for ax, (name, report) in zip(axes.flat, reports.items(), strict=True):
     plot_trust(ax, report)
     ax.set_title(name, loc="left", fontsize=11, fontweight="bold")
-figure
 
 # %% [markdown]
 # **Look at the pictures first.** Ada's skill is gone from the first step on. Those of Ben and Cleo

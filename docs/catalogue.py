@@ -18,7 +18,7 @@ from docstrings import prepared
 
 _LINE = re.compile(r"^<!-- (table|names|modules|sentences): ([\w.]+) -->$", re.MULTILINE)
 
-Definition = ast.ClassDef | ast.FunctionDef | ast.Assign | ast.AnnAssign
+Definition = ast.ClassDef | ast.FunctionDef
 
 
 def expanded(markdown: str, root: Path) -> str:
@@ -80,7 +80,7 @@ def _names(package: Path, root: Path) -> Iterator[str]:
 
 def _modules(package: Path, root: Path) -> Iterator[str]:
     for module in sorted(package.glob("[!_]*.py")):
-        if any(isinstance(of, ast.ClassDef | ast.FunctionDef) for _, of in _public(module)):
+        if any(public(module)):
             yield _in_full(_dotted(module.with_suffix(""), root), path=True)
 
 
@@ -131,18 +131,18 @@ def _in_full(identifier: str, *, path: bool = False) -> str:
 
 
 def _about(name: str, home: Path) -> str:
-    node = dict(_public(home)).get(name)
-    about = ast.get_docstring(node) if isinstance(node, ast.ClassDef | ast.FunctionDef) else None
-    return _first(about)
+    node = dict(public(home)).get(name)
+    return _first(ast.get_docstring(node) if node else None)
 
 
 def _first(docstring: str | None) -> str:
     return " ".join((docstring or "").split("\n\n")[0].split())
 
 
-def _public(module: Path) -> Iterator[tuple[str, Definition]]:
+def public(module: Path) -> Iterator[tuple[str, Definition]]:
+    """Yields the public classes and functions of a module, each with its name."""
     for node in _parsed(module).body:
-        if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_"):
+        if isinstance(node, Definition) and not node.name.startswith("_"):
             yield node.name, node
 
 

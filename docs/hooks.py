@@ -32,6 +32,9 @@ _FROM_THE_NETWORK = re.compile(
     r'<(?:script|img|iframe)[^>]* src="https?:[^"]*|<link[^>]* href="https?:[^"]*'
 )
 _PLAIN = {"NO_COLOR": "1", "COLUMNS": "80", "MPLBACKEND": "agg"}
+_ROOT_OF_A_SERVER = (
+    "<script>if (location.protocol !== 'file:') document.write('<base href=\"/\">')</script>"
+)
 _SLOW = 2.0
 """Seconds after which it is told what took them."""
 
@@ -93,6 +96,14 @@ def on_post_page(output: str, page: Page, **_: Any) -> str:
     if found := _FROM_THE_NETWORK.search(output):
         raise PluginError(f"{page.file.src_uri} loads from the network: {found[0]}")
     return output
+
+
+def on_post_template(output_content: str, template_name: str, **_: Any) -> str:
+    """Lets the page for missing pages find its files on disk, too, where there is no root."""
+    if template_name != "404.html":
+        return output_content
+    relative = re.sub(r'((?:href=|src=|"base": )")/', r"\1", output_content)
+    return relative.replace("<head>", f"<head>{_ROOT_OF_A_SERVER}", 1)
 
 
 def on_serve(server: LiveReloadServer, config: MkDocsConfig, **_: Any) -> None:

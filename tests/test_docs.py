@@ -6,6 +6,7 @@ import re
 import shlex
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -29,11 +30,10 @@ def _load(name: str) -> ModuleType:
     return module
 
 
-kept = _load("kept")
 with pytest.MonkeyPatch.context() as patch:
-    patch.setitem(sys.modules, "kept", kept)
-    hooks = _load("hooks")
-lesson_of, docstrings = _load("lesson"), _load("docstrings")
+    patch.syspath_prepend(ROOT / "docs")  # as MkDocs does for a hook
+    hooks, catalogue, kept = _load("hooks"), _load("catalogue"), _load("kept")
+    lesson_of, docstrings = _load("lesson"), _load("docstrings")
 
 Page = tuple[str, dict[str, bytes]]
 
@@ -160,15 +160,20 @@ def test_a_lesson_is_run_again_only_if_its_sources_have_changed(
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", None], ids=["empty", "no archive", "cut"])
-def test_a_torn_result_is_made_again(
-    counting: tuple[Path, Path], tmp_path: Path, content: bytes | None
-) -> None:
-    (script, marks), cache = counting, tmp_path / "cache"
-    page = hooks.lesson(script, cache)
-    [file] = cache.iterdir()
+def test_a_torn_result_is_made_again(tmp_path: Path, content: bytes | None) -> None:
+    made: list[str] = []
+
+    def make() -> dict[str, bytes]:
+        made.append("|")
+        return {"page.md": b"hello"}
+
+    for _ in range(2):
+        assert kept.made(tmp_path, "a", lambda: "hash", make) == {"page.md": b"hello"}
+    [file] = tmp_path.iterdir()
     file.write_bytes(file.read_bytes()[:-30] if content is None else content)
-    assert hooks.lesson(script, cache) == page
-    assert marks.read_text() == "||"
+    for _ in range(2):
+        assert kept.made(tmp_path, "a", lambda: "hash", make) == {"page.md": b"hello"}
+    assert len(made) == 2
 
 
 def test_a_changed_byte_in_a_result_is_noticed(tmp_path: Path) -> None:
@@ -251,7 +256,109 @@ def test_a_named_tuple_is_shown_with_its_signature(tmp_path: Path) -> None:
     assert shown == [("self", None), ("left", None), ("right", "2")]
 
 
+PACKAGE = """
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    from rooms.kitchen.oven import bake
+    from rooms.door import Door
+__all__ = ["Door", "bake"]
+"""
+OVEN = '''
+"""Ovens: how hot."""
+
+@COOKING.rule("{dish} needs {time:steps}{much}.")
+def needs_long(dish):
+    """Where it needs more than an hour (errata P1)."""
+
+@COOKING.rule("{dish} is raw.", kind="raw")
+def _raw(dish): ...
+
+def bake(dish):
+    """Bakes a dish.
+
+    Slowly.
+    """
+
+def _warm(): ...
+'''
+
+
+@pytest.fixture
+def rooms(tmp_path: Path) -> Path:
+    """Returns a folder with a small package."""
+    kitchen = tmp_path / "rooms" / "kitchen"
+    kitchen.mkdir(parents=True)
+    (kitchen / "__init__.py").write_text("")
+    (kitchen / "oven.py").write_text(OVEN)
+    (kitchen / "_hidden.py").write_text("class Hidden: ...")
+    (kitchen.parent / "__init__.py").write_text(PACKAGE)
+    (kitchen.parent / "door.py").write_text('class Door:\n    """A door."""\n')
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("names: rooms", ["::: rooms.Door"]),
+        ("names: rooms.kitchen", ["::: rooms.bake"]),
+        ("modules: rooms.kitchen", ["::: rooms.kitchen.oven"]),
+        ("table: rooms", ["[`Door`][rooms.door.Door] | A door. |", "| Bakes a dish. |"]),
+        (
+            "sentences: rooms.kitchen",
+            [
+                "### Ovens: how hot\n",
+                "`needs-long`\n\n:   “<var>dish</var> needs <var>time</var> <var>much</var>.”\n",
+                "\n    Where it needs more than an hour (errata [P1][p1]).\n",
+                "`raw`\n\n:   “<var>dish</var> is raw.”\n",
+            ],
+        ),
+        ("sentences: rooms", []),
+    ],
+)
+def test_lists_of_the_reference_are_read_from_the_source(
+    rooms: Path, line: str, found: list[str]
+) -> None:
+    page = catalogue.expanded(f"# A\n\n<!-- {line} -->\n", rooms)
+    assert all(part in page for part in found)
+    assert page.count(":::") == sum(part.startswith(":::") for part in found)
+    assert "<!--" not in page
+
+
+@pytest.mark.parametrize("line", ["names: rooms.garden", "table: rooms.kitchen"])
+def test_a_list_of_nothing_is_refused(rooms: Path, line: str) -> None:
+    with pytest.raises(LookupError, match=line.split()[1]):
+        catalogue.expanded(f"<!-- {line} -->", rooms)
+
+
+def names_of(identifier: str, members: list[str]) -> set[tuple[str, Path]]:
+    """Returns the names that a directive of a page documents, each with its file."""
+    path = ROOT.joinpath(*identifier.split("."))
+    if path.is_dir():
+        return set(catalogue.exports(path, ROOT))
+    module = path.with_suffix(".py")
+    if module.exists():
+        names = {name for name, _ in catalogue.public(module)}
+        return {(name, module) for name in names if name in members or not members}
+    return {of for of in catalogue.exports(path.parent, ROOT) if of[0] == path.name}
+
+
+def test_every_name_that_a_package_exports_is_documented_once() -> None:
+    documented: Counter[tuple[str, Path]] = Counter()
+    for page in (ROOT / "docs" / "reference").rglob("*.md"):
+        text = catalogue.expanded(page.read_text(encoding="utf-8"), ROOT)
+        for directive in re.findall(r"^::: .+(?:\n    .*)*", text, re.MULTILINE):
+            members = re.search(r"members: \[(.*)\]", directive)
+            documented.update(
+                names_of(directive.split()[1], members[1].split(", ") if members else [])
+            )
+    packages = [file.parent for file in (ROOT / "trdlab").rglob("__init__.py")]
+    exported = {name for package in packages for name in catalogue.exports(package, ROOT)}
+    counts = {f"{file.stem}.{name}": documented[name, file] for name, file in exported}
+    assert {name: count for name, count in counts.items() if count != 1} == {}
+
+
 README, TRAIN = (ROOT / "README.md", ROOT / "docs" / "train.md")
+INSTALL = ROOT / "docs" / "install.md"
 RUN, GAME = "CartPole-v1-N10-w1-seed1", "Breakout-N40-w1-seed1"
 
 
@@ -263,7 +370,7 @@ def blocks(page: Path, kind: str) -> list[str]:
 def shown_commands() -> list[str]:
     lines = [
         line
-        for page in (README, TRAIN)
+        for page in (README, INSTALL, TRAIN)
         for block in blocks(page, "console")
         for line in block.splitlines()
     ]

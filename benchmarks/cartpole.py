@@ -12,7 +12,8 @@ from pathlib import Path
 
 from trdlab.deep.presets import preset
 from trdlab.runs.folder import is_run
-from trdlab.show.plots.training import save_learning_curves
+from trdlab.show.plots.style import save
+from trdlab.show.plots.training import curves_figure
 from trdlab.training.loading import evaluate_run
 from trdlab.training.run import begin, carry_on, resume
 
@@ -34,7 +35,7 @@ def main() -> None:
             result, _ = evaluate_run(path, episodes=100, epsilon=0.0)
             print(f"N = {horizon:2}, seed {seed}: {result.mean}, {seconds:.0f} s", flush=True)
             paths.append(path)
-    save_learning_curves(paths, options.folder / "curves.png")
+    save(curves_figure(paths), options.folder / "curves.png")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def test_each_obstacle_is_named_once(tmp_path):
     assert refused(tmp_path / "no" / "a.png") == (
         f"The folder '{tmp_path / 'no'}' does not exist. Create it first."
     )
-    assert refused(old) == f"The file '{old}' exists. Choose another name, or --overwrite."
+    assert refused(old) == f"The file '{old}' exists. Choose another name, or `overwrite=True`."
     assert refused(folder, overwrite=True) == f"'{folder}' is a folder. Name a file."
     check_output(old, SUFFIXES, overwrite=True)
     assert old.read_text() == "old"
@@ -166,7 +166,8 @@ def test_what_a_killed_process_left_is_recognised_and_no_obstacle(tmp_path):
     (tmp_path / "kept").rename(seen[0])
     assert is_leftover(seen[0])
     write_whole(tmp_path / "folder", a_folder("new"))
-    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
+    assert sorted(tmp_path.iterdir()) == [seen[0], tmp_path / "folder"]
+    assert not is_leftover(tmp_path / ".gitkeep")
 
 
 def test_everything_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):

@@ -285,7 +285,7 @@ def overwrites() -> Linear:
 BREACHES = [
     (broken(time_axis=(0.95, 2, 2)), r"time_axis is \(0.95, 2, 2\).*must be a trdlab.TimeAxis"),
     (broken(future="greedy"), r"future is 'greedy'.*must be a trdlab.Future"),
-    (broken(future=Future("greedy", reward=" ")), r"The reward of its future is ' '.*Say whose"),
+    (broken(future=Future(" ")), r"The policy of its future is ' '.*Say in words"),
     (
         broken(decompose=lambda self, x: self.components(self.checked(x))),
         r"returned a ndarray.*Return a trdlab.RewardDecomposition",

@@ -211,6 +211,21 @@ def test_the_step_that_only_begins_an_episode_has_no_chosen_action():
     assert info[f"_{CHOSEN}"].tolist() == [True, True]
 
 
+def test_over_an_autoreset_the_step_that_only_resets_has_no_chosen_action():
+    table = exact(GridworldEnv("tie").mdp, AXIS)
+    inner = gym.wrappers.TransformReward(gym.wrappers.Autoreset(GridworldEnv("tie")), float)
+    env = TemporalRewardDecomposition(inner, table)
+    env.reset(seed=0)
+    told = [env.step(LEFT) for _ in range(5)]  # the second one ends it
+    assert [terminated for _, _, terminated, *_ in told] == [False, True, False, False, True]
+    assert [CHOSEN in info for *_, info in told] == [True, True, False, True, True]
+    np.testing.assert_array_equal(told[0][4][CHOSEN], told[3][4][CHOSEN])
+    first = table.decomposition[env.unwrapped.mdp.start].components
+    np.testing.assert_array_equal(told[2][4][ALL], first)
+    env.reset(seed=0)  # in the place of the step that would only have reset
+    assert CHOSEN in env.step(LEFT)[4]
+
+
 def test_a_reset_of_some_speaks_of_those_alone():
     alone = make_vector(AutoresetMode.DISABLED, inside=True)
     together = make_vector(AutoresetMode.DISABLED, inside=False)

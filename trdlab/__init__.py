@@ -1,28 +1,67 @@
-"""trdlab: when does an agent expect which reward, and how far can that be trusted?"""
+"""trdlab: when does an agent expect which reward, and how far can that be trusted?
 
+The verbs: `solve` a model, `train` a network, or name an `agent`; then `calibrate`, `explain` and
+`compare` it. The nouns: `Agent`, `Estimator`, `Future`, `RewardDecomposition`, `TimeAxis`.
+"""
+
+import os
 import sys
 from typing import TYPE_CHECKING
 
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
+    from trdlab.agents.agent import Agent
     from trdlab.decomposition import RewardDecomposition
     from trdlab.estimator import Estimator, Future
+    from trdlab.policies.protocol import Policy
     from trdlab.time_axis import TimeAxis
     from trdlab.training.loading import load
+    from trdlab.verbs import agent, calibrate, compare, explain, solve, train
 
 __version__ = "0.1.0"
-__all__ = ["Estimator", "Future", "RewardDecomposition", "TimeAxis", "__version__", "load"]
+__all__ = [
+    "Agent",
+    "Estimator",
+    "Future",
+    "Policy",
+    "RewardDecomposition",
+    "TimeAxis",
+    "__version__",
+    "agent",
+    "calibrate",
+    "compare",
+    "explain",
+    "load",
+    "solve",
+    "train",
+]
 
 _HOMES = {
+    "Agent": "agents.agent",
     "RewardDecomposition": "decomposition",
     "TimeAxis": "time_axis",
     "Estimator": "estimator",
     "Future": "estimator",
+    "Policy": "policies.protocol",
     "load": "training.loading",
+    "agent": "verbs",
+    "calibrate": "verbs",
+    "compare": "verbs",
+    "explain": "verbs",
+    "solve": "verbs",
+    "train": "verbs",
 }
 
 __getattr__ = lazily(__name__, _HOMES)
+
+# A command started from a notebook inherits the notebook's backend, which may not be installed
+# here, and then matplotlib could not even be imported.
+if os.environ.get("MPLBACKEND", "").startswith("module://"):
+    from importlib.util import find_spec
+
+    if find_spec(os.environ["MPLBACKEND"].removeprefix("module://").partition(".")[0]) is None:
+        del os.environ["MPLBACKEND"]
 
 # Whoever has imported Gymnasium will want to `make` our maps; nobody else should pay for it.
 if "gymnasium" in sys.modules:

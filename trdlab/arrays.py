@@ -1,5 +1,6 @@
-"""The array types that signatures name, and when two computed numbers are the same one."""
+"""The array types that signatures name, trees of them, and when two numbers are the same one."""
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,3 +21,21 @@ def same(a: float, b: float) -> bool:
     (True, False)
     """
     return abs(a - b) <= RELATIVE_ZERO * max(abs(a), abs(b))
+
+
+def map_leaves(function: Callable[[Any], Any], tree: Any) -> Any:
+    """Returns a tree with a function applied to each of its arrays; None stays None.
+
+    Args:
+        function: from an array to anything.
+        tree: an array, None, or a dict, list or tuple of trees.
+
+    >>> map_leaves(lambda leaf: leaf[[1]], {"h": np.array([3, 4]), "c": (np.array([5, 6]), None)})
+    {'h': array([4]), 'c': (array([6]), None)}
+    """
+    if isinstance(tree, Mapping):
+        return {key: map_leaves(function, leaf) for key, leaf in tree.items()}
+    if isinstance(tree, list | tuple):
+        leaves = [map_leaves(function, leaf) for leaf in tree]
+        return leaves if isinstance(tree, list) else tuple(leaves)
+    return None if tree is None else function(tree)

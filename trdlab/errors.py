@@ -6,6 +6,9 @@ from collections.abc import Iterable
 class TrdlabError(Exception):
     """Base class of every error raised on purpose; the command line exits with `exit_code`.
 
+    A message names arguments as Python does, between backticks, such as `env` or `episodes=50`;
+    only the command line knows the options that they are there.
+
     Args:
         cause: what went wrong, with the offending value.
         cure: what to do about it, if there is something to do.
@@ -31,6 +34,19 @@ class MapError(InputError):
 
 class OutputError(InputError):
     """A result cannot be written where it was asked for."""
+
+
+class NotImported(InputError):  # noqa: N818  it says what a module is, not what failed
+    """A run needs a module that nobody has named: its code is not executed because a file says so.
+
+    Args:
+        cause: what needs it.
+        module: its name.
+    """
+
+    def __init__(self, cause: str, module: str) -> None:
+        super().__init__(cause, f"If you trust it, import {module} first.")
+        self.module = module
 
 
 def closest(name: str, known: Iterable[str]) -> str:

@@ -1,24 +1,100 @@
 """The contract of everything that decomposes: an exact table, a learned one, a network."""
 
-from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from dataclasses import dataclass, fields
+from itertools import product
+from typing import Any, Protocol, Self, runtime_checkable
 
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.errors import InputError
 
 
 @dataclass(frozen=True)
 class Future:
     """Whose future a decomposition speaks of, in which reward, and what ends it.
 
+    What it says in words and how rewards are counted follow from the same fields, so that a
+    decomposition is judged by what it claims to tell.
+
     Args:
         policy: who acts after the first action, for example `the optimal policy`.
-        reward: the reward it counts, for example `reward as the environment pays it`.
-        ending: what ends it, for example `terminal states`.
+        clip_rewards: whether the sign of each reward counts in place of the reward.
+        life_loss_ends: whether nothing is left to come where a life is lost.
+        time_limit_ends: whether nothing is left to come where the environment cuts an episode off.
+
+    Raises:
+        InputError: a field is of another type.
+
+    >>> lives = Future("the greedy policy", clip_rewards=True, life_loss_ends=True)
+    >>> lives.reward, lives.ending
+    ('sign of each reward', 'a lost life, or the end of the game')
+    >>> lives.count(np.array([10.0, 0.0, -2.0])).tolist()
+    [1.0, 0.0, -1.0]
     """
 
     policy: str
-    reward: str = "reward as the environment pays it"
-    ending: str = "terminal states"
+    clip_rewards: bool = False
+    life_loss_ends: bool = False
+    time_limit_ends: bool = False
+
+    def __post_init__(self) -> None:
+        for field, kind in zip(fields(self), (str, bool, bool, bool), strict=True):
+            value = getattr(self, field.name)
+            if not isinstance(value, kind):
+                wanted = "It must be True or False." if kind is bool else "Say in words who acts."
+                raise InputError(f"The {field.name} of a Future is {value!r}.", wanted)
+
+    @property
+    def reward(self) -> str:
+        """The reward it counts, in words."""
+        return "sign of each reward" if self.clip_rewards else "reward as the environment pays it"
+
+    @property
+    def ending(self) -> str:
+        """What ends it, in words."""
+        return {
+            (False, False): "the end of the episode",
+            (True, False): "a lost life, or the end of the game",
+            (False, True): "the end of the episode, or the time limit",
+            (True, True): "a lost life, the end of the game, or the time limit",
+        }[self.life_loss_ends, self.time_limit_ends]
+
+    def count(self, rewards: FloatArray) -> FloatArray:
+        """Returns rewards `[...]` as they are counted."""
+        return np.sign(rewards) if self.clip_rewards else rewards
+
+    def ends(self, terminated: BoolArray, truncated: BoolArray, life_lost: BoolArray) -> BoolArray:
+        """Returns `[B]`: where nothing is left to come after a step.
+
+        Args:
+            terminated: `[B]`, whether the episode ended for good.
+            truncated: `[B]`, whether the environment cut it off.
+            life_lost: `[B]`, whether a life was lost and the episode goes on.
+        """
+        lost, cut = life_lost & self.life_loss_ends, truncated & self.time_limit_ends
+        return np.asarray(terminated | lost | cut)
+
+    def to_dict(self) -> dict[str, str]:
+        """Returns its words, for JSON."""
+        return {"policy": self.policy, "reward": self.reward, "ending": self.ending}
+
+    @classmethod
+    def from_dict(cls, words: dict[str, str]) -> Self:
+        """Returns the future that `to_dict` wrote.
+
+        Raises:
+            InputError: no future has such words.
+        """
+        for flags in product((False, True), repeat=3):
+            future = cls(words["policy"], *flags)
+            if future.to_dict() == words:
+                return future
+        raise InputError(
+            f"No future counts the '{words['reward']}' and ends at '{words['ending']}'.",
+            "Write it with to_dict.",
+        )
 
 
 @runtime_checkable

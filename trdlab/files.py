@@ -6,10 +6,14 @@ import os
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
+from secrets import token_hex
 from shutil import rmtree
+from stat import S_ISREG
 from typing import Any
 
 from trdlab.errors import OutputError, TrdlabError, closest
+
+_LEFTOVER = ".trdlab-"
 
 
 def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = False) -> None:
@@ -39,7 +43,7 @@ def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = Fal
     if is_folder:
         raise OutputError(f"'{path}' is a folder.", "Name a file.")
     if exists and not overwrite:
-        raise OutputError(f"The file '{path}' exists.", "Choose another name, or --overwrite.")
+        raise OutputError(f"The file '{path}' exists.", "Choose another name, or `overwrite=True`.")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"The folder '{folder}' is not writable.", "Choose another one.")
 
@@ -56,10 +60,9 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     Raises:
         OutputError: the disk is full, or it cannot be written for another reason.
     """
-    # Names have limits. The dot marks what a killed process may have left: see `is_leftover`.
-    temporary = path.with_name(f".{path.stem[:40]}.{os.getpid()}{path.suffix}")
+    # Names have limits, and this one is nobody else's: a killed process leaves it behind.
+    temporary = path.with_name(f"{_LEFTOVER}{token_hex(4)}-{path.stem[:40]}{path.suffix}")
     try:
-        remove(temporary)  # of a killed process that had our number
         write(temporary)
         _sync(temporary)
         temporary.replace(path)
@@ -74,7 +77,29 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
 
 def is_leftover(path: Path) -> bool:
     """Returns whether this is what `write_whole` leaves behind if the process is killed."""
-    return path.name.startswith(".")
+    return path.name.startswith(_LEFTOVER)
+
+
+def check_own(path: Path) -> None:
+    """Refuses a link: what lies behind it may be somebody else's, and is not written to or deleted.
+
+    Args:
+        path: a file that is to be written in place, or a folder in which files are to be deleted;
+            it need not be there.
+
+    Raises:
+        OutputError: it is a link, or a file that has another name elsewhere.
+    """
+    cure = "Put a copy of what it leads to in its place."
+    try:
+        found = path.lstat()
+    except OSError:  # whoever writes it will say why that cannot be done
+        return
+    # junctions are what Windows has for folders
+    if path.is_symlink() or getattr(os.path, "isjunction", lambda path: False)(path):
+        raise OutputError(f"'{path}' is a link, and is not written through.", cure)
+    if S_ISREG(found.st_mode) and found.st_nlink > 1 and found.st_size:
+        raise OutputError(f"'{path}' is a hard link: it has another name elsewhere.", cure)
 
 
 def remove(path: Path) -> None:

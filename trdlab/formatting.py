@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from itertools import pairwise
 
 _SMALLEST_FIXED = 1e-4
 _LARGEST_FIXED = 1e7
@@ -45,7 +46,7 @@ def number(value: float, decimals: int = 2) -> str:
     if not math.isfinite(value):
         return "none" if math.isnan(value) else ("-" if value < 0 else "") + "inf"
     if abs(value) >= _LARGEST_FIXED or (decimals > 2 and abs(value) < _SMALLEST_FIXED):
-        return f"{value:.2e}"
+        return f"{value:.{max(2, decimals - 2) if abs(value) >= _LARGEST_FIXED else 2}e}"
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
@@ -59,6 +60,65 @@ def amount(value: float, decimals: int | None = None) -> str:
     if math.isfinite(value) and abs(value) < _LARGEST_FIXED and abs(value - round(value)) < 1e-9:
         return str(round(value))
     return number(value, decimals_for([value]) if decimals is None else decimals)
+
+
+def decimals_to_tell(values: Iterable[float]) -> int:
+    """Returns the decimals at which a group is read and different numbers look different.
+
+    >>> [decimals_to_tell(pair) for pair in ([3.26, 3.52], [4.0, 3.99999], [1e12, 1.001e12])]
+    [2, 5, 5]
+    """
+    told = list(values)
+    decimals = decimals_for(told)
+    while decimals < 15 and _look_alike(told, decimals):
+        decimals += 1
+    return decimals
+
+
+def _look_alike(values: list[float], decimals: int) -> bool:
+    """Returns whether two different numbers are printed alike."""
+    ordered = sorted(value for value in values if math.isfinite(value))
+    return any(
+        not math.isclose(a, b, rel_tol=1e-12) and number(a, decimals) == number(b, decimals)
+        for a, b in pairwise(ordered)
+    )
+
+
+def said(value: float, digits: int = 3) -> str:
+    """Returns a number as sentences say it: significant digits, without zeros at their end.
+
+    Whole numbers keep all their digits.
+
+    >>> said(2.7075), said(4.0), said(-0.0475), said(1234.5), said(2.71e-12)
+    ('2.71', '4', '-0.0475', '1234', '2.71e-12')
+    """
+    if value == 0.0 or not math.isfinite(value):
+        return number(value)
+    if not _SMALLEST_FIXED <= abs(value) < _LARGEST_FIXED:
+        mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+        return f"{_bare(mantissa)}e{exponent}"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return _bare(f"{value:.{decimals}f}")
+
+
+def digits_to_tell(values: Iterable[float], least: int = 3) -> int:
+    """Returns the significant digits at which different numbers look different (at most 15).
+
+    >>> [digits_to_tell(pair) for pair in ([3.26, 3.52], [4.0, 3.99999], [1e12, 1.001e12])]
+    [3, 6, 4]
+    """
+    told: list[float] = []
+    for value in values:
+        if not any(math.isclose(value, other, rel_tol=1e-12) for other in told):
+            told.append(value)
+    for digits in range(least, 15):
+        if len({said(value, digits) for value in told}) == len(told):
+            return digits
+    return 15 if len(told) > 1 else least
+
+
+def _bare(text: str) -> str:
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def plain(value: float) -> str:

@@ -7,8 +7,10 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from gymnasium.vector import VectorEnv, VectorWrapper
 from gymnasium.vector.utils import concatenate, create_empty_array
+from gymnasium.wrappers import Autoreset
 
 from trdlab.arrays import BoolArray, FloatArray
+from trdlab.environments.answers import layers
 from trdlab.errors import InputError, TrdlabError
 from trdlab.estimator import Estimator
 
@@ -21,8 +23,9 @@ class TemporalRewardDecomposition(gym.Wrapper[Any, Any, Any, Any], RecordConstru
 
     `info["reward_decomposition"]`, `[A, N+1]`, speaks of every action at the observation just
     returned. After a step `info["chosen_decomposition"]`, `[N+1]`, speaks of the action just
-    taken, at the observation it was taken in. Nothing else changes. At the observation of a
-    terminated step no action follows, whatever the estimator says of it.
+    taken, at the observation it was taken in; over Gymnasium's `Autoreset` there is none after a
+    step that only begins the next episode. Nothing else changes. At the observation of a terminated
+    step no action follows, whatever the estimator says of it.
 
     Args:
         env: an environment with discrete actions.
@@ -48,6 +51,7 @@ class TemporalRewardDecomposition(gym.Wrapper[Any, Any, Any, Any], RecordConstru
         self._actions = _discrete(env.action_space)
         self.estimator = _checked_estimator(estimator)
         self._components: FloatArray | None = None  # [A, N+1] at the last observation
+        self._resetting = [layer for layer in layers(env) if isinstance(layer, Autoreset)]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -59,9 +63,11 @@ class TemporalRewardDecomposition(gym.Wrapper[Any, Any, Any, Any], RecordConstru
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Steps, and decomposes the action taken and every action at the new observation."""
         before = _looked_up(self._components)
+        only_resets = any(layer.autoreset for layer in self._resetting)
         observation, reward, terminated, truncated, info = self.env.step(action)
-        chosen = before[int(action) - int(self._actions.start)].copy()
-        added = {ALL_ACTIONS: self._look_up(observation), CHOSEN: chosen}
+        added = {ALL_ACTIONS: self._look_up(observation)}
+        if not only_resets:
+            added[CHOSEN] = before[int(action) - int(self._actions.start)].copy()
         return observation, reward, terminated, truncated, {**info, **added}
 
     def _look_up(self, observation: Any) -> FloatArray:

@@ -21,13 +21,14 @@ from trdlab.agents import Agent
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import assess, explain, moment_at
 from trdlab.explanations.calibration.sentences import trust_sentences
 from trdlab.explanations.moment.sentences import sentence
 from trdlab.gridworld import Gridworld, load_map
+from trdlab.policies import Memoryless
 from trdlab.show.plots.calibration import plot_trust
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 from exercise import check
 
@@ -210,7 +211,7 @@ def agent(name, table, axis):
         make=lambda count, seed: ModelEnvironments(
             model, count, seed=seed, time_limit=200
         ),
-        policy=lambda states: np.eye(4)[autopilot[states]],
+        policy=Memoryless(lambda states: np.eye(4)[autopilot[states]]),
     )
 
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from small_runs import train
-from trdlab.agents import find_agent, gridworld_agent
-from trdlab.agents.agent import tabular_agent
+from trdlab.agents import find_agent, gridworld_agent, tabular_agent
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations import moment_at
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 4)
 
@@ -81,38 +80,46 @@ def test_where_a_model_has_no_limit_four_horizons_pass():
 
 def test_an_exact_table_acts_in_another_model_with_the_same_states():
     still = "tabular:FrozenLake-v1,is_slippery=false"
-    abroad = find_agent("tabular:FrozenLake-v1", time_axis=TimeAxis(0.9, 6), env=still)
+    abroad = find_agent("tabular:FrozenLake-v1", gamma=0.9, horizon=6, env=still)
     assert moment_at(abroad).q_value("down") < 0.9**5
-    assert abroad.words == ("tabular:FrozenLake-v1", "--gamma", "0.9", "--N", "6", "--env", still)
+    assert abroad.origin.words == (
+        "tabular:FrozenLake-v1",
+        "--gamma",
+        "0.9",
+        "--N",
+        "6",
+        "--env",
+        still,
+    )
     home = find_agent("gridworld:ledge,slip=0.3")
-    assert home.words == ("gridworld:ledge,slip=0.3",)
-    assert home.place == ("--env", "gridworld:ledge,slip=0.3")
+    assert home.origin.words == ("gridworld:ledge,slip=0.3",)
+    assert home.origin.place == ("--env", "gridworld:ledge,slip=0.3")
 
 
 def test_a_run_acts_in_its_own_environment_or_in_one_that_is_named(trained):
     agent = find_agent(str(trained))
     assert agent.name == "lake"
-    assert agent.words == (str(trained),)
-    assert agent.place == ("--env", "FrozenLake-v1", "--env-arg", "is_slippery=false")
+    assert agent.origin.words == (str(trained),)
+    assert agent.origin.place == ("--env", "FrozenLake-v1", "--env-arg", "is_slippery=false")
     abroad = find_agent(str(trained), env="FrozenLake-v1")
-    assert abroad.words == (str(trained), "--env", "FrozenLake-v1")
+    assert abroad.origin.words == (str(trained), "--env", "FrozenLake-v1")
 
 
 def test_a_run_acts_in_an_exact_model_and_a_table_in_an_environment(trained):
     model = "tabular:FrozenLake-v1,is_slippery=false"
     run = find_agent(str(trained), env=model)
     assert isinstance(run.make(1, 0), ModelEnvironments)
-    assert run.words == (str(trained), "--env", model)
+    assert run.origin.words == (str(trained), "--env", model)
     place = {"env": "FrozenLake-v1", "env_arguments": ["is_slippery=false"]}
-    table = find_agent(model, time_axis=TimeAxis(0.9, 6), **place)
+    table = find_agent(model, gamma=0.9, horizon=6, **place)
     assert (
-        table.words[-4:]
-        == table.place
+        table.origin.words[-4:]
+        == table.origin.place
         == ("--env", "FrozenLake-v1", "--env-arg", "is_slippery=false")
     )
     moment = moment_at(table, step=5)  # at the goal's side
     assert moment.components("right")[0] == 1.0
-    with pytest.raises(InputError, match="does not fit the agent: its observations are 14 states"):
+    with pytest.raises(InputError, match="does not fit the agent: it has 14 states"):
         find_agent(str(trained), env="gridworld:drone")
 
 
@@ -155,7 +162,7 @@ def test_a_checkpoint_is_named_by_its_step(trained):
         ("tabular:CartPole-v1", {}, "CartPole-v1 has no transition table"),
         ("runs/none", {}, "There is no 'runs/none'"),
         ("runs/none@5", {}, "There is no 'runs/none'"),
-        ("runs/none", {"time_axis": AXIS}, "A run has its own"),
+        ("runs/none", {"gamma": 0.9}, "is a run with its own"),
         ("x" * 5000, {}, "'xxx.{57}…' names no agent: File name too long"),
     ],
 )

@@ -90,6 +90,23 @@ def test_copies_go_on_as_the_games_do():
         AtariEnvironments("Breakout", 1, seed=1, sticky=0.25).branch(np.array([0]), seed=0)
 
 
+def test_of_games_that_are_not_active_nothing_is_told():
+    games, every = (AtariEnvironments("Breakout", 3, seed=1) for _ in range(2))
+    games.reset()
+    every.reset()
+    active, ended = np.array([True, False, True]), 0
+    for actions in np.random.default_rng(0).integers(4, size=(220, 3)):
+        told, expected = games.step(actions, active), every.step(actions)
+        for field in fields(Step):
+            of, by = getattr(told, field.name), getattr(expected, field.name)
+            np.testing.assert_array_equal(of[active], by[active])
+        silent = (told.rewards, told.terminated, told.truncated, told.life_lost)
+        assert not any(of[1] for of in silent)
+        ended += int(expected.ended[1])
+    assert ended > 0
+    assert games.state_dict()["lengths"][1] == 0
+
+
 def test_same_seed_same_games_and_each_game_another():
     def played(seed: int) -> list[bytes]:
         games = AtariEnvironments("SpaceInvaders", 2, seed=seed, sticky=0.25)

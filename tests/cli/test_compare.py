@@ -75,7 +75,7 @@ def test_elsewhere(trdlab, trained):
     ("words", "message"),
     [
         (["gridworld:ledge", "gridworld:ledg"], "There is no map 'ledg'. Did you mean 'ledge'?"),
-        (["gridworld:ledge", "gridworld:drone"], "they see 8 states and 14 states"),
+        (["gridworld:ledge", "gridworld:drone"], "they have 8 states and 14 states"),
         (["gridworld:ledge", "runs/none"], "There is no 'runs/none'"),
         (["gridworld:ledge"], "Missing argument 'B'"),
         ([*TABLES, "--env", "gridworld:drone"], "'gridworld:drone' does not fit the agent"),
@@ -98,10 +98,13 @@ def test_refusals_are_one_clear_line(trdlab, words, message):
 
 def test_runs_have_their_own_axis_and_observations(trdlab, trained):
     code, _, err = trdlab("compare", trained, trained, "--gamma", 0.9)
-    assert (code, "Runs have their own γ, N and w." in err) == (2, True)
+    assert (
+        code,
+        "Each of the two is a run with its own γ, N and w. Leave out --gamma, --N and --w." in err,
+    ) == (2, True)
     code, _, err = trdlab("compare", trained, "gridworld:ledge")
     assert (code, err.count("\n")) == (2, 1)
-    assert "drone and ledge cannot be compared: they see 14 states and 8 states" in err
+    assert "drone and ledge cannot be compared: they have 14 states and 8 states" in err
     code, _, err = trdlab("compare", trained, "gridworld:drone", "--gamma", 0.5)
     assert (code, "The discount factors differ: 0.9 and 0.5." in err) == (2, True)
 

@@ -116,8 +116,8 @@ def test_a_run_in_another_environment(explain, trained):
     assert code == 0
     assert "It was judged by 12 episodes" in out
     for env, why in (
-        ("trdlab/LedgeGridworld-v0", "its observations are 8 states, those of the agent 14 states"),
-        ("CartPole-v1", "its observations are 4 float32, those of the agent 14 states"),
+        ("trdlab/LedgeGridworld-v0", "it has 8 states, and the agent knows 14 states"),
+        ("CartPole-v1", "it has 4 float32, and the agent knows 14 states"),
         ("Acrobt-v1", "There is no environment 'Acrobt-v1'. Did you mean 'Acrobot-v1'?"),
     ):
         code, _, err = explain(trained, "--env", env)

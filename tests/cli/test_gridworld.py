@@ -31,9 +31,12 @@ def test_the_papers_numbers(capsys: pytest.CaptureFixture[str]):
     assert "[0, 0, 3.26]" in rows["up"]
     assert "[0.95, 1.76, 0.81]" in rows["down"]
     assert "3.52" in rows["down"]
-    assert "Both routes pay 4 in total." in out
-    assert "Down gives more immediate rewards" in out
-    assert "the optimal policy" in out
+    assert "Down gives more immediate rewards: 2.71 within 4 steps, where up gives nothing." in out
+    assert len(out.splitlines()) <= 24
+    assert max(map(len, out.splitlines())) <= 80
+    _, details, _ = run(capsys, "gridworld", "--N", "2", "--w", "2", "--details")
+    assert "What would change that" in details
+    assert "What would change that" not in out
 
 
 def test_the_papers_numbers_step_by_step(capsys: pytest.CaptureFixture[str]):
@@ -47,15 +50,17 @@ def test_json_has_full_precision_and_nothing_else_is_on_stdout(capsys: pytest.Ca
     data = json.loads(out)
     actions = data["actions"]
     assert code == 0
-    assert data["schema"] == "trdlab.gridworld/1"
+    assert data["schema"] == "trdlab.gridworld/2"
     assert actions["up"]["components"][-1] == pytest.approx(4 * 0.95**4, abs=1e-12)
     for action in actions.values():
         assert sum(action["components"]) == pytest.approx(action["q_value"], abs=1e-12)
     assert actions["down"]["deviation"] == [0.0] * 5
     assert actions["down"]["survival"] == [1.0] * 5
-    kinds = {finding["kind"] for finding in data["findings"]}
-    assert {"equal-totals", "more-immediate", "never-flips", "whose-future"} <= kinds
-    assert all(finding["sentence"].endswith(".") for finding in data["findings"])
+    findings = [finding for section in data["sections"] for finding in section["findings"]]
+    kinds = {finding["kind"] for finding in findings}
+    assert {"better-by-discount", "more-immediate", "never-flips", "decided-by"} <= kinds
+    assert all(finding["sentence"].endswith(".") for finding in findings)
+    assert {finding["kind"] for finding in data["answer"]} <= kinds
 
 
 def test_json_has_null_where_no_total_exists(capsys: pytest.CaptureFixture[str]):
@@ -65,10 +70,9 @@ def test_json_has_null_where_no_total_exists(capsys: pytest.CaptureFixture[str])
 
 def test_options_change_the_world(capsys: pytest.CaptureFixture[str]):
     _, out, _ = run(capsys, "gridworld", "--treasure", "5", "--action", "up", "--foil", "left")
-    assert "Up against left" in out
-    assert "0.86888" not in out  # that is where up and down change places
-    _, out, _ = run(capsys, "gridworld", "--treasure", "5")
-    assert "The preference flips where γ is 0.86888 instead of 0.95" in " ".join(out.split())
+    assert "up − left" in out
+    _, out, _ = run(capsys, "gridworld", "--treasure", "5", "--details")
+    assert "Down would be better if γ were below 0.869 instead of 0.95." in out
     _, slippery, _ = run(capsys, "gridworld", "--slip", "0.2", "--json")
     assert json.loads(slippery)["map"]["slip"] == 0.2
 
@@ -81,10 +85,10 @@ def test_states_are_named_by_number_or_place(capsys: pytest.CaptureFixture[str])
 
 def test_ties_are_said_and_can_be_mixed(capsys: pytest.CaptureFixture[str]):
     _, out, _ = run(capsys, "gridworld", "--map", "tie")
-    assert "Here left and right tie" in out
-    assert "of tied actions the first" in " ".join(out.split())
+    assert "Left and right are equally good here, but their futures differ" in out
+    assert "the numbers follow the first." in " ".join(out.split())
     _, out, _ = run(capsys, "gridworld", "--map", "tie", "--ties", "mixed")
-    assert "mixes tied actions evenly" in " ".join(out.split())
+    assert "the numbers mix them evenly." in " ".join(out.split())
     assert "chosen 50 %" in out
 
 
@@ -94,8 +98,8 @@ def test_a_map_file(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     code, out, _ = run(capsys, "gridworld", "--map", str(path))
     assert code == 0
     assert out.startswith("mine · Mine")
-    assert "Up and down have the same components." in out
-    assert f"Try: trdlab gridworld --map {path}" in "".join(out.split("\n"))
+    assert "Up and down lead to the same rewards at the same times." in out
+    assert f"Try: trdlab gridworld --map {path}" in " ".join(out.split())
 
 
 def test_a_gamma_too_close_to_1_is_not_called_exact(capsys: pytest.CaptureFixture[str]):
@@ -124,7 +128,7 @@ def test_list_shows_every_map(capsys: pytest.CaptureFixture[str]):
     _, as_json, _ = run(capsys, "gridworld", "--list", "--json")
     assert json.loads(as_json)[0]["name"] == "drone"
     for name in ("drone", "patience", "bridge", "tie", "corridor", "loop", "windy"):
-        assert f"\n{name}" in out
+        assert any(line.startswith(name) for line in out.splitlines())
 
 
 def test_version(capsys: pytest.CaptureFixture[str]):
@@ -188,12 +192,20 @@ def test_pictures_are_written_once(capsys: pytest.CaptureFixture[str], tmp_path:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["drone.pdf", "drone.png", "drone.svg"]
 
 
-@pytest.mark.parametrize("columns", ["40", "80", "120"])
-def test_no_colour_and_no_overflow_in_pipes(columns: str):
+@pytest.mark.parametrize("columns", ["24", "40", "80", "120"])
+def test_no_colour_no_overflow_and_no_padding_in_pipes(columns: str):
     shown = in_shell("gridworld", "--N", "2", "--w", "2", COLUMNS=columns)
     text = shown.stdout.decode()
     assert "\x1b" not in text
     assert max(map(len, text.splitlines())) <= int(columns)
+    assert "3.26" in text  # no number is cut
+    assert not any(line.endswith(" ") for line in text.splitlines())
+
+
+def test_a_terminal_of_no_width_is_one_of_80():
+    shown = in_shell("gridworld", COLUMNS="0").stdout.decode()
+    assert max(map(len, shown.splitlines())) <= 80
+    assert "Down gives more immediate rewards" in shown
 
 
 def test_colour_can_be_refused():

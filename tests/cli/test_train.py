@@ -1,13 +1,16 @@
 """`trdlab train`, `resume`, `evaluate` and `runs` as their users see them."""
 
+import fcntl
 import io
 import json
 import os
+import pty
 import re
 import shutil
 import signal
 import subprocess
 import sys
+import termios
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,8 +23,11 @@ from rich.console import Console
 
 from trdlab.cli import main
 from trdlab.cli.options import flag
-from trdlab.cli.progress import TrainingProgress, stopping
+from trdlab.cli.progress import EpisodeProgress, TrainingProgress, stopping
 from trdlab.deep.presets import PRESETS, preset
+from trdlab.rollouts.playing import Progress
+from trdlab.runs import RunFolder, checkpoint_steps
+from trdlab.training.loading import load
 
 Outcome = tuple[int, str, str]
 Trdlab = Callable[..., Outcome]
@@ -254,7 +260,7 @@ def test_an_evaluation_as_json(trdlab, trained):
     code, out, err = trdlab("evaluate", trained, "--episodes", 2, "--seed", 3, "--json")
     assert code == 0
     data = json.loads(out)
-    assert data["schema"] == "trdlab.rollouts.evaluation/1"
+    assert data["schema"] == "trdlab.evaluation/1"
     assert (data["episodes"], data["seed"], len(data["returns"])) == (2, 3, 2)
     kept = Path(err.removeprefix("Kept: ").strip())
     assert json.loads(kept.read_text()) == {"agent_steps": 120, **data}
@@ -265,6 +271,23 @@ def test_an_evaluation_as_json(trdlab, trained):
     code, _, err = trdlab("evaluate", trained, "--epsilon", 2)
     assert code == 2
     assert "Invalid value for '--epsilon'" in err
+
+
+def test_an_evaluation_that_would_never_return_is_cut_off(trdlab, tmp_path):
+    words = ("train", "gym", "CliffWalking-v1", *SMALL, "--out", tmp_path / "run")
+    code, out, _ = trdlab(*words)
+    assert code == 0
+    assert "3 of 3 were cut off at step 1,000" in " ".join(out.split())
+    code, out, err = trdlab("evaluate", tmp_path / "run", "--max-steps", 7, "--json")
+    data = json.loads(out)
+    assert (code, data["lengths"], data["max_steps"]) == (0, [7, 7, 7], 7)
+    assert err.endswith("seed-1000-max-steps-7.json\n")
+    assert len(list((tmp_path / "run" / "evaluations").iterdir())) == 2
+
+
+def test_the_environments_own_limit_is_enough(trdlab, trained):
+    _, out, _ = trdlab("evaluate", trained, "--json")
+    assert json.loads(out)["max_steps"] is None
 
 
 def test_the_list_of_runs(trdlab, trained, tmp_path):
@@ -280,10 +303,74 @@ def test_the_list_of_runs(trdlab, trained, tmp_path):
     assert header == "run environment N w steps score status"
     assert any(re.fullmatch(r"pole CartPole-v1 2 1 120 [\d.]+ done", row) for row in rows)
     assert any(row.startswith("torn ") for row in rows)
-    assert any(row.startswith("edited Its config.toml has") for row in rows)
+    assert any(row.startswith("edited ") for row in rows)
+    assert "env = 'X', and the run began with" in " ".join(rows)
     assert "no run" not in out
     code, out, _ = trdlab("runs", tmp_path / "nowhere")
     assert (code, out) == (0, f"There are no runs in '{tmp_path / 'nowhere'}'.\n")
+
+
+@pytest.fixture
+def received(trained, tmp_path, monkeypatch) -> Iterator[Path]:
+    """Returns a run whose environment needs a module, which leaves a mark when it is executed."""
+    run = Path(shutil.copytree(trained, tmp_path / "received"))
+    for name in ("config.toml", "manifest.json"):
+        text = (run / name).read_text().replace('"CartPole-v1"', '"their_world:CartPole-v1"')
+        (run / name).write_text(text)
+    (tmp_path / "their_world.py").write_text("import pathlib\npathlib.Path('executed').touch()")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", [path for path in sys.path if path not in ("", ".")])
+    yield run
+    sys.modules.pop("their_world", None)
+
+
+def test_a_module_is_not_imported_because_a_run_says_so(trdlab, received):
+    for words in (["resume"], ["evaluate"], ["explain"], ["compare", received]):
+        code, out, err = trdlab(*words, received)
+        assert (code, out) == (2, "")
+        assert err == (
+            "error: The environment 'their_world:CartPole-v1' needs code that the run does not "
+            "hold: the module 'their_world'. If you trust it, add: --import their_world\n"
+        )
+    assert trdlab("runs", received.parent)[0] == 0
+    assert len(load(received).decompose([[0.0] * 4])) == 1  # which needs no environment
+    assert not Path("executed").exists()
+    assert "their_world" not in sys.modules
+
+
+@pytest.mark.parametrize("kind", ["tabular:their_world", "gridworld"])
+def test_the_name_of_a_model_is_no_way_around(trdlab, received, kind):
+    for name in ("config.toml", "manifest.json"):
+        text = (received / name).read_text().replace("their_world", kind)
+        (received / name).write_text(text)
+    code, _, err = trdlab("explain", received)
+    assert (code, f"the module '{kind}'. If you trust it" in err) == (2, True)
+    assert not Path("executed").exists()
+
+
+@pytest.mark.parametrize("command", ["evaluate", "explain"])
+def test_a_module_that_is_named_is_imported_from_the_present_folder(trdlab, received, command):
+    words = (command, received, "--json", "--episodes", 2, "--import")
+    code, out, err = trdlab(*words, "their_world")
+    assert code == 0, err
+    assert json.loads(out)
+    assert Path("executed").exists()
+    code, _, err = trdlab(*words, "nobodys_world")
+    assert (code, err) == (2, "error: 'nobodys_world' cannot be imported: No module named "
+                           "'nobodys_world'. Check its name, or correct it.\n")  # fmt: skip
+
+
+def test_an_environment_in_the_present_folder(trdlab, received):
+    words = ("train", "gym", "their_world:CartPole-v1", *SMALL, "--out", "mine")
+    assert trdlab(*words)[0] == 0  # also its evaluation
+    assert sys.path[0] != str(Path.cwd())  # nothing there hides what is installed
+    sys.modules.pop("their_world")
+    for step in Path("mine/checkpoints").iterdir():
+        shutil.rmtree(step)
+    code, _, err = trdlab("evaluate", "mine", "--import", "their_world")
+    assert code == 2
+    assert err.endswith("Train on: trdlab resume mine --import their_world.\n")
+    assert trdlab("resume", "mine", "--import", "their_world")[0] == 0
 
 
 def test_pipes_get_plain_text(trained, tmp_path):
@@ -325,6 +412,20 @@ def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
     ]
 
 
+def test_episodes_are_told_of_in_a_pipe_too(monkeypatch):
+    now = [1000.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    console = Console(file=io.StringIO(), width=80)
+    with EpisodeProgress(console) as progress:
+        for step in range(1, 45):
+            now[0] += 0.5
+            progress.on_progress(Progress("episodes to score", step // 10, 30, 100 * step))
+    assert console.file.getvalue().splitlines() == [  # type: ignore[attr-defined]
+        "Playing episodes to score: step 2,000, 2 of 30 are over",
+        "Playing episodes to score: step 4,000, 4 of 30 are over",
+    ]
+
+
 def test_on_a_terminal_there_is_a_bar():
     console = Console(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
     with TrainingProgress(console, total=1000) as progress:
@@ -336,9 +437,12 @@ def test_on_a_terminal_there_is_a_bar():
     assert "━" in shown
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_asks_and_the_next_one_is_not_held_up(number):
-    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {each: signal.getsignal(each) for each in SIGNALS}
     with stopping() as stop:
         assert not stop()
         signal.raise_signal(number)
@@ -348,3 +452,41 @@ def test_a_signal_asks_and_the_next_one_is_not_held_up(number):
     with stopping():
         assert signal.getsignal(number) is not before[number]
     assert {each: signal.getsignal(each) for each in before} == before
+
+
+def test_what_nohup_ignores_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stopping() as stop:
+            signal.raise_signal(signal.SIGHUP)
+            assert not stop()
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_terminal_that_is_closed_stops_and_saves(tmp_path):
+    out, (ours, theirs) = tmp_path / "run", pty.openpty()
+    words = ["train", "gym", "CartPole-v1", *SMALL, "--agent-steps=1000000", "--out", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "trdlab", *words],
+        stdin=theirs, stdout=theirs, stderr=theirs,
+        preexec_fn=lambda: (os.setsid(), fcntl.ioctl(0, termios.TIOCSCTTY, 0)),
+    ) as process:  # fmt: skip
+        os.close(theirs)
+        seen = b""
+        while b"of 1,000,000 steps" not in seen:
+            seen += os.read(ours, 1000)
+        os.close(ours)
+        assert process.wait(60) == 129
+    assert len(checkpoint_steps(RunFolder.open(out))) == 1
+
+
+def test_a_run_that_will_learn_nothing_says_so(trdlab, tmp_path):
+    words = ("train", "gym", "CartPole-v1", *SMALL, "--learning-starts", 120)
+    line = (
+        "Nothing will be learned: updates begin after 120 agent steps, and the run ends after 120."
+    )
+    code, _, err = trdlab(*words, "--out", tmp_path / "run")
+    assert (code, line in err.splitlines()) == (0, True)
+    assert line in trdlab(*words, "--dry-run")[1].splitlines()

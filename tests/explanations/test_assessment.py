@@ -1,5 +1,6 @@
 """Agents: named, played, and judged by what came."""
 
+import random
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,12 +10,13 @@ import pytest
 
 from trdlab.agents import Agent, gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.environments import Environments
+from trdlab.environments import Environments, GymEnvironments
 from trdlab.errors import InputError
-from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
 from trdlab.explanations import assess, check, explain, moment_at, sentences
+from trdlab.explanations.calibration.faults import faults
+from trdlab.policies import Memoryless
 from trdlab.rollouts import Copying, collect
-from trdlab.tabular import MDP, ExactTable, exact
+from trdlab.tabular import MDP, ExactTable, ModelEnvironments, exact
 
 AXIS = TimeAxis(0.95, 4)
 
@@ -28,10 +30,10 @@ def slippery(tmp_path: Path, slip: float) -> str:
 def test_an_exact_table_is_trusted_over_its_whole_horizon():
     report = assess(gridworld_agent("ledge", AXIS), episodes=300, copying=Copying())
     assert report.trust.is_whole
-    assert report.epsilon == 0.0
-    assert report.blame is not None
-    assert report.blame.shift == 0
-    assert not report.faults
+    assert report.judged.epsilon == 0.0
+    assert report.errors is not None
+    assert report.errors.shift == 0
+    assert faults(report) == []
     assert report.ceiling is not None
     skill, limit = report.calibration.skill, report.ceiling.skill
     assert (skill.low <= limit.high)[:-1].all()
@@ -40,15 +42,16 @@ def test_an_exact_table_is_trusted_over_its_whole_horizon():
 
 def test_where_all_episodes_are_the_same_some_actions_are_random():
     report = assess(gridworld_agent("drone", AXIS), episodes=60, copying=Copying())
-    assert report.epsilon == 1.0 / 6.0
+    assert (report.judged.epsilon, report.score.epsilon) == (1.0 / 6.0, 0.0)
+    assert (report.score.different, report.score.returns.value) == (1, 4.0)
     assert report.trust.is_whole
     assert report.calibration.error.value[:-1].max() == pytest.approx(0.0, abs=1e-20)
     assert report.ceiling is not None
     assert report.ceiling.deterministic
     told = assess(gridworld_agent("drone", AXIS), episodes=60, epsilon=0.0)
-    assert told.epsilon == 0.0
+    assert told.judged.epsilon == 0.0
     assert told.trust.last_step is None
-    assert set(told.calibration.states) == {"too few episodes"}
+    assert set(told.calibration.status) == {"open"}
 
 
 def test_copies_that_were_not_followed_do_not_tell_that_there_is_no_chance():
@@ -84,17 +87,17 @@ def test_what_is_wrong_from_some_step_on_is_marked_in_every_explanation():
 
 
 class Once(gym.Env):
-    """An environment of one step that pays 1; copies of it can be forbidden."""
+    """An environment of one step that pays 1; it can have neither copies nor a second time."""
 
-    observation_space = gym.spaces.Discrete(1)
-    action_space = gym.spaces.Discrete(2)
+    observation_space = gym.spaces.Discrete(12)
+    action_space = gym.spaces.Discrete(4)
 
     def __init__(self, copyable: bool = True) -> None:
         self.copyable = copyable
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        return 0, {}
+        return 0 if self.copyable else random.SystemRandom().randrange(12), {}
 
     def step(self, action):
         return 0, 1.0, True, False, {}
@@ -112,11 +115,12 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
 
     def make(num_envs: int, seed: int) -> Environments:
         made = {"copyable": copyable}
-        return CopyableGymEnvironments("Once-v0", num_envs, seed=seed, env_arguments=made)
+        return GymEnvironments("Once-v0", num_envs, seed=seed, env_arguments=made)
 
-    agent = Agent("once", drone.estimator, ("wait", "take"), make)
+    agent = Agent("once", drone.estimator, ("wait", "take", "a", "b"), make)
     report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
-    assert (report.ceiling is not None) == copyable
+    assert (report.ceiling is not None) == (report.foils is not None) == copyable
+    assert report.lost == "" if copyable else "Once-v0 cannot be copied: " in report.lost
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -131,12 +135,12 @@ def test_moments_are_found_in_short_episodes_beside_a_few_that_never_end(seed):
     report = assess(agent, episodes=60, max_steps=400, copying=Copying(episodes=2), seed=seed)
     assert report.ceiling is not None
     assert report.ceiling.num_moments >= 2
-    assert report.endings.truncated > 0
+    assert report.judged.truncated > 0
 
 
 def test_a_step_is_of_the_episode_that_the_story_tells():
     agent = gridworld_agent("ledge", AXIS)
-    uniform = replace(agent, policy=lambda states: np.full((len(states), 4), 0.25))
+    uniform = replace(agent, policy=Memoryless(lambda states: np.full((len(states), 4), 0.25)))
     for seed in range(5):
         environments = uniform.make(1, seed)
         (episode,) = collect(agent.estimator, environments, policy=uniform.policy, seed=seed)

@@ -10,8 +10,10 @@ import pytest
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import GymEnvironments, Step
+from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.rollouts.evaluation import Evaluation, evaluate
+from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
+from trdlab.rollouts.playing import Progress
 
 END, CUT = "the game is over", "cut off"
 
@@ -31,12 +33,13 @@ class Scripted:
         self.observation_space = gym.spaces.Box(0, 1e6, (1,), np.float32)
 
     def reset(self) -> np.ndarray:
-        self.steps = np.zeros(self.num_envs, dtype=np.int64)
+        self.steps, self.taken = np.zeros(self.num_envs, dtype=np.int64), 0
         return self.steps[:, None].astype(np.float32)
 
-    def step(self, actions: np.ndarray) -> Step:
+    def step(self, actions: np.ndarray, active: np.ndarray) -> Step:
         pays = np.array([story[at] for story, at in zip(self.stories, self.steps, strict=True)])
-        self.steps += 1
+        self.steps += active
+        self.taken += int(active.sum())
         frames = self.steps[:, None].astype(np.float32)
         over = self.steps == [len(story) for story in self.stories]
         cut = (self.steps == self.cut) & ~over
@@ -64,13 +67,16 @@ class Taking:
 
 
 def test_returns_lengths_and_ends_by_hand():
-    told: list[int] = []
+    told: list[Progress] = []
     environments = Scripted([1, 2, -4], [10], [1, 1, 1, 1, 1, 1], [0.5, 0.25], cut=5)
-    result = evaluate(Taking(), environments, on_episode=told.append)
+    result = evaluate(Taking(), environments, watch=told.append)
     assert result.returns.tolist() == [-1, 10, 5, 0.75]
     assert result.lengths.tolist() == [3, 1, 5, 2]
     assert result.truncated.tolist() == [False, False, True, False]
-    assert told == [1, 2, 3, 4]
+    assert [(now.steps, now.finished, now.episodes) for now in told] == [
+        (1, 1, 4), (2, 2, 4), (3, 3, 4), (4, 3, 4), (5, 4, 4)
+    ]  # fmt: skip
+    assert environments.taken == result.lengths.sum() == 11  # nobody acts on who has finished
     waiting = evaluate(Taking(0, 2), environments)
     assert waiting.returns.tolist() == [2, 0, 3, 0.25]
 
@@ -79,15 +85,6 @@ def test_what_comes_after_an_episode_does_not_count():
     alone = evaluate(Taking(1), Scripted([3, 1, 4]))
     beside = evaluate(Taking(1), Scripted([1], [3, 1, 4], [1] * 50))
     assert (beside.returns[1], beside.lengths[1]) == (alone.returns[0], alone.lengths[0]) == (7, 3)
-
-
-def test_an_episode_that_ended_is_not_cut_off_by_the_next():
-    environments = Scripted([1, 1], [1] * 5)
-    result = evaluate(
-        Taking(), environments, on_episode=lambda finished: setattr(environments, "cut", 1)
-    )
-    assert result.truncated.tolist() == [False, False]
-    assert environments.steps[0] == 0  # which was cut off after each step
 
 
 def test_those_that_have_finished_are_not_asked_about():
@@ -119,10 +116,28 @@ def test_random_actions_do_not_depend_on_who_finishes_first():
     assert few.returns[0] == many.returns[0]
 
 
-def test_nobody_is_asked_where_all_is_random():
-    estimator = Taking()
-    evaluate(estimator, Scripted([1, 2]), epsilon=1.0)
-    assert estimator.shown == []
+def test_episodes_are_cut_off_where_one_asks_for_it():
+    result = evaluate(Taking(), Scripted([1, 2, -4], [10], [1] * 6), max_steps=3)
+    assert result.returns.tolist() == [-1, 10, 3]
+    assert result.lengths.tolist() == [3, 1, 3]
+    assert result.truncated.tolist() == [False, False, True]
+    assert result.to_dict()["max_steps"] == 3
+    with pytest.raises(InputError, match=r"Episodes have 0 steps\. Ask for at least 1\."):
+        evaluate(Taking(), Scripted([5]), max_steps=0)
+
+
+def test_episodes_one_after_another_are_those_of_one_evaluation():
+    stories = [[1.0] * 30, [2.0], [3.0] * 5]
+    parts = [evaluate(Taking(), Scripted(story), epsilon=0.5, seed=1) for story in stories]
+    result = joined(parts)
+    assert result.lengths.tolist() == [30, 1, 5]
+    assert result.returns.tolist() == [part.returns[0] for part in parts]
+    assert (result.epsilon, result.seed) == (0.5, 1)
+
+
+def test_what_neither_acts_nor_decomposes_is_refused():
+    with pytest.raises(InputError, match="This str neither acts nor decomposes"):
+        evaluate("greedy", Scripted([1]))  # type: ignore[arg-type]
 
 
 def test_a_gymnasium_environment_as_its_own_loop_would_play_it():
@@ -158,7 +173,7 @@ def test_means_have_intervals_and_all_of_it_is_json():
     for of in (result.mean, result.interquartile_mean):
         assert 0 <= of.low < of.value < of.high <= 100
     told = json.loads(json.dumps(result.to_dict(), allow_nan=False))
-    assert told["schema"] == "trdlab.rollouts.evaluation/1"
+    assert told["schema"] == "trdlab.evaluation/1"
     assert told["mean"] == {"value": 13.6, "low": result.mean.low, "high": result.mean.high,
                             "level": 0.95}  # fmt: skip
     assert (told["episodes"], told["epsilon"], told["seed"]) == (10, 0.1, 2)

@@ -7,12 +7,14 @@ import pytest
 
 from trdlab.agents import Agent, gridworld_agent
 from trdlab.decomposition import TimeAxis
+from trdlab.environments import Environments
 from trdlab.errors import InputError
-from trdlab.explain.copies import ModelEnvironments
-from trdlab.explanations import assess, play
+from trdlab.explanations import assess
+from trdlab.policies import Memoryless
 from trdlab.rollouts import collect
 from trdlab.rollouts.playing import Progress, usual_limit
 from trdlab.rollouts.realised import what_followed
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.9, 2, 2)
 
@@ -20,14 +22,14 @@ AXIS = TimeAxis(0.9, 2, 2)
 def undecided() -> Agent:
     """Returns an agent that takes each action as likely as any other."""
     agent = gridworld_agent("ledge,slip=0.3", AXIS)
-    return replace(agent, policy=lambda states: np.full((len(states), 4), 0.25))
+    return replace(agent, policy=Memoryless(lambda states: np.full((len(states), 4), 0.25)))
 
 
 def test_a_limit_of_ours_is_like_one_of_the_environment():
     agent = undecided()
     assert agent.world is not None
     mdp = agent.world.mdp
-    own, ours = (ModelEnvironments(mdp, 20, seed=3, time_limit=limit) for limit in (6, 50))
+    own, ours = (ModelEnvironments(mdp, 60, seed=3, time_limit=limit) for limit in (6, 50))
     how = {"policy": agent.policy, "seed": 4}
     expected = collect(agent.estimator, own, **how)
     found = collect(agent.estimator, ours, max_steps=6, **how)
@@ -43,7 +45,7 @@ def test_a_limit_of_ours_is_like_one_of_the_environment():
 
 def test_an_episode_of_no_step_is_refused():
     with pytest.raises(InputError, match="Episodes have 0 steps"):
-        play(undecided(), max_steps=0)
+        undecided().play(1, seed=0, max_steps=0)
 
 
 def test_episodes_last_four_horizons_at_least():
@@ -61,5 +63,27 @@ def test_it_is_told_how_far_episodes_are():
         "episodes with copies of first actions",
     ]
     first = [progress for progress in heard if progress.what == "episodes to judge by"]
-    assert [progress.steps for progress in first] == list(range(1, len(first) + 1))
-    assert (first[-1].finished, first[-1].episodes) == (12, 12)
+    assert {progress.episodes for progress in first} == {12}
+    done = [progress.finished for progress in first]
+    assert done == sorted(done)
+    assert done[-1] == 12
+
+
+@pytest.mark.parametrize(
+    ("name", "epsilon", "played", "judged_by"),
+    [
+        ("drone", 0.0, [60], 1),  # all alike: no more of them, and that one once
+        ("drone", None, [60, 300], 300),  # then with some random actions
+        ("ledge", None, [60, 240], 300),
+        ("drone", 0.1, [300], 300),
+    ],
+)
+def test_episodes_that_are_all_alike_are_not_played_again(name, epsilon, played, judged_by):
+    agent, made = gridworld_agent(name, AXIS), []
+
+    def make(num_envs: int, seed: int) -> Environments:
+        made.append(num_envs)
+        return agent.make(num_envs, seed)
+
+    report = assess(replace(agent, make=make), episodes=300, epsilon=epsilon)
+    assert (made, report.num_episodes) == (played, judged_by)

@@ -44,6 +44,7 @@ def check(run: RunFolder, at_least: int) -> int:
 def check_tidy(run: RunFolder, step: int) -> None:
     """Checks that there is nothing but the last two checkpoints."""
     assert checkpoint_steps(run) == [step - 1, step]
+    assert len(list(run.checkpoints.iterdir())) == 2
     assert not [path for path in run.path.rglob("*") if is_leftover(path)]
     assert len(list(run.replay.iterdir())) == BLOCKS + 1
 

@@ -16,6 +16,7 @@ from hypothesis.extra import numpy as hnp
 
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_arrays, save_checkpoint
+from trdlab.runs.index import Index
 from trdlab.runs.state import DTYPES, pack, unpack
 
 
@@ -96,7 +97,8 @@ def test_arrays_in_any_memory_order_and_names_that_meet(run):
 def test_one_part_is_read_alone(run):
     save_checkpoint(run, 5, a_state(5))
     (run.checkpoints / "000000005" / "memory.safetensors").unlink()
-    weights = read_arrays(run, "q_network")
+    step, weights = read_arrays(run, "q_network")
+    assert step == 5
     assert list(weights) == ["bias", "head.weight"]
     assert weights["head.weight"].tolist() == [[5, 5]] * 3
     with pytest.raises(InputError, match=r"step 5 has no 'q_net'\. Did you mean 'q_network'\?"):
@@ -172,6 +174,24 @@ def test_a_run_without_a_checkpoint_says_so(run):
         load_checkpoint(run, 3)
 
 
+def test_who_reads_the_newest_while_it_is_thinned_out_gets_a_newer_one(run, monkeypatch):
+    def overtaken(folder: Path) -> Index:
+        monkeypatch.undo()
+        newest = checkpoint_steps(run)[-1]
+        for step in (newest + 1, newest + 2):
+            save_checkpoint(run, step, a_state(step))
+        return Index.read(folder)  # which is gone
+
+    save_checkpoint(run, 1, a_state(1))
+    monkeypatch.setattr(Index, "read", overtaken)
+    assert load_checkpoint(run).step == 3
+    monkeypatch.setattr(Index, "read", overtaken)
+    assert read_arrays(run, "q_network")[0] == 5
+    monkeypatch.setattr(Index, "read", overtaken)
+    with pytest.raises(TrdlabError, match="The checkpoint at step 4 cannot be used"):
+        load_checkpoint(run, 4)
+
+
 # ---- what is torn ------------------------------------------------------------------------------
 
 
@@ -200,7 +220,7 @@ def test_a_torn_checkpoint_is_named_and_never_skipped(run, name, damage):
         load_checkpoint(run)
     assert str(caught.value).startswith("The checkpoint at step 2 cannot be used: '")
     assert path.name[:8] in str(caught.value)
-    assert "The one at step 1 is whole: --checkpoint 1, or" in str(caught.value)
+    assert "The one at step 1 is whole: `checkpoint=1`, or" in str(caught.value)
     assert same(load_checkpoint(run, 1).state, a_state(1))
     save_checkpoint(run, 2, a_state(2), some_blocks(2))  # the run goes on from there
     assert same(load_checkpoint(run).state, a_state(2))
@@ -309,7 +329,8 @@ def test_whatever_write_fails_the_checkpoint_before_is_whole(run, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Path, "write_bytes", failing)
-    for allowed in range(6):  # two blocks, the state, the weights, the memory, the index
+    # the index of what comes, two blocks, the state, the weights, the memory, the index
+    for allowed in range(7):
         left = allowed
         with pytest.raises(OutputError) as caught:
             save_checkpoint(run, 2, a_state(2), some_blocks(1, 2, 3))
@@ -318,7 +339,7 @@ def test_whatever_write_fails_the_checkpoint_before_is_whole(run, monkeypatch):
         assert str(caught.value).endswith(f"trdlab resume {run.path} goes on from step 1.")
         assert (files(run.replay), files(run.checkpoints)) == before
         assert same(load_checkpoint(run).state, a_state(1))
-    left = 6
+    left = 7
     save_checkpoint(run, 2, a_state(2), some_blocks(1, 2, 3))
     assert load_checkpoint(run).blocks == some_blocks(1, 2, 3)
 
@@ -363,12 +384,12 @@ def test_a_first_checkpoint_that_fails(run):
 
 
 def test_old_checkpoints_that_cannot_be_deleted_are_no_failure_to_save(run, monkeypatch):
-    def failing(*_: object) -> None:
+    def failing(*_: object, **__: object) -> None:
         raise OSError(errno.EACCES, os.strerror(errno.EACCES))
 
     for step in (1, 2):
         save_checkpoint(run, step, a_state(step))
-    monkeypatch.setattr("trdlab.files.rmtree", failing)
+    monkeypatch.setattr(Path, "unlink", failing)
     with pytest.raises(OutputError, match=r"step 3 is saved, but an old one .*: Permission denied"):
         save_checkpoint(run, 3, a_state(3))
     assert same(load_checkpoint(run).state, a_state(3))

@@ -52,13 +52,13 @@ def test_what_is_there_is_never_replaced(tmp_path):
         "--out."
     )
     assert RunFolder.open(path).config == {}
-    with pytest.raises(OutputError, match=r"' is not empty\. Choose another --out\."):
+    with pytest.raises(OutputError, match=r"' is not empty\. Choose another `out`\."):
         RunFolder.create(tmp_path, {})
     file = tmp_path / "file"
     file.write_text("mine")
-    with pytest.raises(OutputError, match=r"' is a file\. Choose another --out\."):
+    with pytest.raises(OutputError, match=r"' is a file\. Choose another `out`\."):
         RunFolder.create(file, {})
-    with pytest.raises(OutputError, match=r"Cannot make '.*/run': .*Choose another --out\."):
+    with pytest.raises(OutputError, match=r"Cannot make '.*/run': .*Choose another `out`\."):
         RunFolder.create(file / "run", {})
     assert file.read_text() == "mine"
 
@@ -119,6 +119,7 @@ def test_a_misspelt_run_gets_a_suggestion(run):
     ("name", "text", "error"),
     [
         ("manifest.json", '{"format": 1, "trd', r"manifest\.json' is torn: "),
+        ("manifest.json", '{"format": 1}', r"torn: it does not say what the run was told\.$"),
         ("manifest.json", "[]", r"manifest\.json' is torn: it does not say its format"),
         ("manifest.json", None, r"manifest\.json' cannot be read: No such file"),
         ("config.toml", "env = Break", r"config\.toml' is not valid TOML: .*line 1"),
@@ -143,6 +144,27 @@ def test_a_torn_run_and_one_of_another_version(run, name, text, error):
     [row] = list_runs(run.path.parent)
     assert row.path == run.path
     assert row.fault == str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("gamma = 0.99", "gamma = 0.5", "says gamma = 0.5, and the run began with 0.99."),
+        ("gamma = 0.99", "", "says gamma = nothing, and the run began with 0.99."),
+        ("double = true", "double = true\nw = 3", "says w = 3, and the run began with nothing."),
+        ("[128, 64]", "[128]", "says hidden = [128], and the run began with [128, 64]."),
+    ],
+)
+def test_a_run_was_told_what_it_was_told(run, old, new, message):
+    path = run.path / "config.toml"
+    text = path.read_text()
+    path.write_text("# my first\n" + text.replace(" = ", "   =  "))
+    assert RunFolder.open(run.path) == run  # people may write comments
+    path.write_text(text.replace(old, new))
+    with pytest.raises(InputError) as caught:
+        RunFolder.open(run.path)
+    cure = "Put it back, or begin another run with that file."
+    assert str(caught.value) == f"'{path}' {message} {cure}"
 
 
 # ---- configurations ----------------------------------------------------------------------------
@@ -234,7 +256,7 @@ def test_all_runs_are_listed_and_a_torn_one_says_so(tmp_path):
     for step in (1, 2000):
         save_checkpoint(run, step, {})
     first, second, third = list_runs(tmp_path)
-    assert "metrics.jsonl', line 2 of those read, is torn" in first.fault
+    assert "metrics.jsonl', the last line, is torn. Delete that line." in first.fault
     assert second.config == {"seed": 1}
     assert second.metrics == {"agent_steps": 4999, "loss": 0.5}
     assert (second.step, second.pid, second.fault) == (2000, None, None)

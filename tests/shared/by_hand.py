@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
+from trdlab.explanations.calibration.trust import Trust
 from trdlab.rollouts.episodes import Episode
-from trdlab.tabular import ExactTable
+from trdlab.tabular import ExactTable, exact
+from trdlab.tabular.uncertainty import spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,3 +64,29 @@ def occupancy(table: ExactTable) -> FloatArray:
     begin = np.eye(mdp.num_states)[mdp.start]
     states: FloatArray = np.linalg.solve(np.eye(mdp.num_states) - chain, begin)
     return states[:, None] * policy
+
+
+def trusted(axis: TimeAxis, components: int, residual: bool = False) -> Trust:
+    """Returns that so many explicit components are good, and the others bad."""
+    explicit = ["good"] * components + ["bad"] * (axis.horizon - components)
+    return Trust(axis, (*explicit, "good" if residual else "bad"))  # type: ignore[arg-type]
+
+
+def exact_ceiling(table: ExactTable, visits: FloatArray) -> FloatArray:
+    """Returns `[N+1]`: the skill of a perfect prediction, by how often `visits [S, A]` occur."""
+    weights = (visits / visits.sum())[..., None]  # [S, A, 1]
+    components = table.decomposition.components
+    mean = (weights * components).sum(axis=(0, 1))
+    between = (weights * (components - mean) ** 2).sum(axis=(0, 1))
+    within = (weights * spread(table).variance).sum(axis=(0, 1))
+    with np.errstate(invalid="ignore"):  # 0/0 where nothing varies
+        return np.asarray(between / (between + within))
+
+
+def exact_tails(table: ExactTable, visits: FloatArray, steps: int) -> FloatArray:
+    """Returns `[steps + 1]`: the share of the discounted rewards that comes each step or later."""
+    magnitudes = table.mdp.with_rewards(np.abs(table.mdp.rewards))
+    axis = TimeAxis(table.time_axis.gamma, steps)
+    components = exact(magnitudes, axis, policy=table.solution.policy).decomposition.components
+    tails = np.cumsum(np.einsum("sa,san->n", visits, components)[::-1])[::-1]
+    return np.asarray(tails / tails[0])

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Mapping
 
-from trdlab.explanations import UnsupportedSentenceError
+from trdlab.explanations.rules import UnsupportedSentenceError
 
 
 def numbers(sentence: str) -> list[str]:

@@ -6,15 +6,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from trdlab.explanations.explained import Explained, Part, parse_parts
+from trdlab.explanations.moment.sentences import UnsupportedSentenceError
+from trdlab.show.explained import check_explained, summary, to_dict
 
 from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations import Moment, assess, explain, explain_agent
-from trdlab.explanations.explained import Explained, Part, parse_parts
-from trdlab.explanations.moment.sentences import UnsupportedSentenceError
-from trdlab.show.explained import check_explained, summary, to_dict
 from trdlab.show.plots.explained import (
     moment_figure,
     part_figure,
@@ -94,8 +94,8 @@ def test_bars_that_are_not_to_be_trusted_are_faded():
     explanation, report = found.explanation, found.report
     assert explanation is not None
     assert report is not None
-    trust = replace(report.trust, components=2, residual=True)
-    of_foils = replace(report.trust, components=3, residual=False)
+    trust = replace(report.trust, components=2, tested=2, residual=True)
+    of_foils = replace(report.trust, components=3, tested=3, residual=False)
     moment = replace(explanation.moment, trust=trust, foil_trust=of_foils)
     figure = moment_figure(replace(explanation, moment=moment), explanation.foil, "ledge")
     figure.canvas.draw()
@@ -126,7 +126,7 @@ def test_how_often_a_reward_came_is_drawn_where_there_is_one_amount():
     several = explained("ledge").report  # -1 and 1
     assert several is not None
     assert len(trust_figure(several, "ledge").axes) == 1
-    coin = assess(gridworld_agent("loop,slip=0.2", TimeAxis(0.95, 4)), episodes=40)
+    coin = assess(gridworld_agent("loop,slip=0.2", TimeAxis(0.95, 4)), episodes=120)
     skill, chance = trust_figure(coin, "loop").axes
     assert skill.get_ylabel().startswith("skill")
     assert chance.get_title() == "chance of the reward of 1"

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from trdlab.explanations.moment.explanation import explain
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.moment.explanation import explain
 from trdlab.explanations.moment.moment import Moment, Uncertainty
 from trdlab.show.plots.explained import moment_figure
 from trdlab.show.plots.moment import plot_components, plot_uncertainty, whiskers

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from by_hand import trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import tell
 from trdlab.rollouts.episodes import Episode
@@ -74,8 +74,8 @@ def test_what_is_not_to_be_trusted_is_faded():
     veils = []
     for components, residual in ((4, True), (2, False)):
         ax, below = Figure().subplots(2, 1)
-        plot_story(ax, below, told, Trust(axis, components, components, components, residual))
+        plot_story(ax, below, told, trusted(axis, components, residual))
         veils.append(sum(patch.get_alpha() is not None for patch in ax.patches))
     assert veils == [0, 3]
-    text = story_figure(told, "", Trust(axis, 2, 2, 2, False)).texts[-1].get_text()
+    text = story_figure(told, "", trusted(axis, 2)).texts[-1].get_text()
     assert "faded: has not proved better than a guess" in text

@@ -2,6 +2,7 @@
 
 import io
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,10 @@ def test_an_evaluation_in_numbers():
     assert "interquartile mean 500.0 95 % interval" in shown
     assert "least and most 480.0 … 500.0" in shown
     assert "mean length 1,200.0 agent steps 3 of 4 were cut off" in shown
+    at_limit = words(evaluation_page(replace(result, max_steps=1200)))
+    assert "3 of 4 were cut off at step 1,200" in at_limit
+    elsewhere = words(evaluation_page(replace(result, max_steps=1300)))
+    assert "cut off at" not in elsewhere + shown
     assert "cut off" not in words(evaluation_page(evaluation([1.0])))
     assert "greedy, 5.0% random actions," in words(evaluation_page(evaluation([1.0], 0.05)))
 

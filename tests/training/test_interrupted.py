@@ -201,7 +201,7 @@ def test_ten_kills_at_random_moments(command, uninterrupted, tmp_path, num_envs)
         run = RunFolder.open(out)
         resumed_from.append(max(checkpoint_steps(run), default=0))
         if resumed_from[-1]:
-            in_episodes += read_arrays(run, "environments")["lengths"].min() > 0
+            in_episodes += read_arrays(run, "environments")[1]["lengths"].min() > 0
     assert resumed_from[0] == 0
     assert resumed_from[-1] >= STEPS // 2
     assert in_episodes >= 5
@@ -214,7 +214,11 @@ def test_a_stopped_run_is_saved_at_that_very_step_and_goes_on_from_there(
 ):
     out = tmp_path / "my run"
     words = train(out, 1)
-    for sent, code, moment in ((signal.SIGINT, 130, 101), (signal.SIGTERM, 143, 203)):
+    for sent, code, moment in (
+        (signal.SIGINT, 130, 101),
+        (signal.SIGTERM, 143, 161),
+        (signal.SIGHUP, 129, 203),
+    ):
         command.start(words)
         wait_until(has_told(out, moment))
         command.send(sent)

@@ -12,19 +12,22 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.wrappers import FrameStackObservation
+from trdlab.explanations.moment.sentences import check, sentences
 
 import trdlab
+from trdlab.cli import main
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
-from trdlab.errors import InputError
+from trdlab.environments import Environments, NotParallel
+from trdlab.environments.interface import Interface
+from trdlab.errors import InputError, NotImported
 from trdlab.estimator import Estimator, Future
 from trdlab.explanations import explain, moment_of
-from trdlab.explanations.moment.sentences import check, sentences
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs import RunFolder, load_checkpoint
 from trdlab.training.loading import evaluate_run, load
 from trdlab.training.run import begin, carry_on
-from trdlab.training.setup import described_space
+from trdlab.training.setup import make_environments
 from trdlab.wrappers import TemporalRewardDecomposition, VectorTemporalRewardDecomposition
 
 DRONE = "trdlab/DroneGridworld-v0"
@@ -98,8 +101,8 @@ def test_in_the_wrappers(drone, tmp_path, pixels):
             Future(
                 "the greedy policy of the network (for the first 2 steps, the ε-greedy one it "
                 "learned from)",
-                "sign of each reward",
-                "a lost life, or the end of the game",
+                clip_rewards=True,
+                life_loss_ends=True,
             ),
         ),
     ],
@@ -131,18 +134,52 @@ def test_in_explanations(tmp_path, lines, future):
 
 def test_an_evaluation_is_kept_with_what_it_was_made_with(drone):
     told = []
-    result, path = evaluate_run(drone, on_episode=told.append)
+    result, path = evaluate_run(drone, watch=told.append)
     assert path.parent == drone / "evaluations"
     kept = json.loads(path.read_text())
     assert kept == {"agent_steps": 300, **result.to_dict()}
     assert (kept["episodes"], kept["epsilon"], kept["seed"]) == (5, 0.1, 1000)
-    assert told[-1] == 5
+    assert (told[-1].finished, told[-1].episodes) == (5, 5)
     again, same_path = evaluate_run(drone)
     assert (same_path, again.to_dict()) == (path, result.to_dict())
     _, other = evaluate_run(drone, episodes=3, epsilon=1.0, seed=4, step=200)
     assert other != path
     kept = json.loads(other.read_text())
     assert [kept[key] for key in ("agent_steps", "episodes", "epsilon", "seed")] == [200, 3, 1, 4]
+
+
+def test_where_there_can_be_one_environment_episodes_come_one_after_another(drone, monkeypatch):
+    def alone(settings: TrainSettings, *, num_envs: int, seed: int) -> Environments:
+        if num_envs > 1:
+            raise NotParallel("There is one already.", "Close it.")
+        made.append(seed)
+        return make_environments(settings, num_envs=num_envs, seed=seed)
+
+    made, told = [], []
+    monkeypatch.setattr("trdlab.training.loading.make_environments", alone)
+    result, path = evaluate_run(drone, watch=told.append)
+    assert len(set(made)) == len(result.returns) == 5
+    assert (told[-1].finished, told[-1].episodes) == (5, 5)
+    assert json.loads(path.read_text())["returns"] == result.returns.tolist()
+
+
+@pytest.mark.parametrize("harm", ["a file", "a link", "nothing"])
+def test_an_evaluation_that_cannot_be_kept_is_told_all_the_same(drone, tmp_path, capsys, harm):
+    run, elsewhere = Path(shutil.copytree(drone, tmp_path / "run")), tmp_path / "elsewhere"
+    shutil.rmtree(run / "evaluations")
+    elsewhere.mkdir()
+    if harm == "a file":
+        (run / "evaluations").touch()
+    elif harm == "a link":
+        (run / "evaluations").symlink_to(elsewhere)
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", str(run)])
+    out, err = capsys.readouterr()
+    assert end.value.code == 0
+    assert "mean return" in out
+    assert err.startswith("Kept: " if harm == "nothing" else "Not kept: ")
+    assert "Not a directory." in err or "is a link" in err or harm == "nothing"
+    assert not list(elsewhere.iterdir())
 
 
 def test_without_a_checkpoint_there_is_nothing_to_evaluate(tmp_path):
@@ -156,12 +193,12 @@ def test_without_a_checkpoint_there_is_nothing_to_evaluate(tmp_path):
 
 def test_a_run_can_be_moved_and_needs_no_environment(drone, tmp_path):
     moved = Path(shutil.copytree(drone, tmp_path / "elsewhere"))
-    config = (moved / "config.toml").read_text().replace(DRONE, "gone:Gone-v0")
-    (moved / "config.toml").write_text(config)
+    for name in ("config.toml", "manifest.json"):  # as on a machine that does not have it
+        (moved / name).write_text((moved / name).read_text().replace(DRONE, "gone:Gone-v0"))
     np.testing.assert_array_equal(
         load(moved).decompose([0]).components, load(drone).decompose([0]).components
     )
-    with pytest.raises(InputError, match=r"gone:Gone-v0 cannot be imported"):
+    with pytest.raises(NotImported, match=r"module 'gone'\. If you trust it, import gone first\."):
         evaluate_run(moved)
 
 
@@ -180,7 +217,7 @@ def test_a_run_can_be_moved_and_needs_no_environment(drone, tmp_path):
     ],
 )
 def test_what_an_agent_sees_is_read_from_the_manifest(described, space):
-    assert described_space(described) == space
+    assert Interface.from_dict({"observation": described, "num_actions": 2}).space == space
 
 
 def test_importing_trdlab_does_not_import_what_loading_needs():

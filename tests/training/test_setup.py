@@ -10,12 +10,12 @@ import pytest
 from trdlab.deep.presets import PRESETS
 from trdlab.deep.replay import ReplayBuffer
 from trdlab.deep.settings import TrainSettings
+from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.runs import to_toml
 from trdlab.training.setup import (
     default_path,
     describe,
-    described_space,
     make_environments,
     plan,
     read_settings,
@@ -96,7 +96,7 @@ def test_auto_is_resolved_and_what_is_seen_comes_back(env, arguments, threads, m
     kept = resolved(settings.changed({"threads": 3, "device": "cpu"}), environments)
     assert (kept.threads, kept.device) == (3, "cpu")
     described: Any = describe(environments)
-    space = described_space(described["observation"])
+    space = Interface.from_dict(described).space
     if isinstance(space, gym.spaces.Box):
         bare = gym.make(env, **({"observation": "pixels"} if arguments else {})).observation_space
         stack = (1,) if arguments else ()

@@ -1,21 +1,22 @@
-"""Exact models by their names, as agents and environments are named: `gridworld:ledge,slip=0.2`."""
+"""Exact models: by names such as `gridworld:ledge,slip=0.2`, or of what carries one."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.environments.arguments import parse_arguments, say_arguments
+from trdlab.environments.arguments import parse_name, say_name
+from trdlab.environments.naming import numbered
 from trdlab.errors import InputError, closest
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs.folder import is_run
+from trdlab.tabular import MDP
+from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.reach import reachable
-from trdlab.tabular.toytext import make_world
+from trdlab.tabular.toytext import make_world, tabular_world
 
 GRIDWORLD, TABULAR = "gridworld:", "tabular:"
 """What stands before the name of a map or its file, and of an environment with a `P` table."""
@@ -87,7 +88,7 @@ def gridworld_model(text: str) -> Model:
     Raises:
         InputError: the map cannot be read, or does not take an argument.
     """
-    name, arguments = _apart(text.removeprefix(GRIDWORLD))
+    name, arguments = parse_name(text.removeprefix(GRIDWORLD))
     for key in arguments:
         if key not in _OF_GRIDWORLDS:
             cause = f"A gridworld takes no argument '{key}'."
@@ -96,15 +97,7 @@ def gridworld_model(text: str) -> Model:
         cause = f"The argument {_ANYWHERE} is '{arguments[_ANYWHERE]}'."
         raise InputError(cause, "It must be true or false.")
     env = GridworldEnv(name, **arguments)
-    running = reachable(env.mdp) & ~env.mdp.terminal_states
-    rows, columns = env.world.grid.shape
-    return Model(
-        name=_together(env.world.grid.name, arguments),
-        world=env.world,
-        starts=running / running.sum() if env.exploring_starts else None,
-        time_limit=None,
-        usual_limit=max(_LEAST_STEPS, 4 * rows * columns),
-    )
+    return _of_gridworld(env.world, say_name(env.world.grid.name, arguments), env.exploring_starts)
 
 
 def tabular_model(text: str) -> Model:
@@ -116,15 +109,9 @@ def tabular_model(text: str) -> Model:
     Raises:
         InputError: there is no such environment, it has no table, or does not take an argument.
     """
-    env_id, arguments = _apart(text.removeprefix(TABULAR))
+    env_id, arguments = parse_name(text.removeprefix(TABULAR))
     world = make_world(env_id, arguments)
-    return Model(
-        name=_together(world.name.rpartition("/")[2], arguments),
-        world=world,
-        starts=world.starts,
-        time_limit=world.time_limit,
-        usual_limit=min(max(_LEAST_STEPS, 4 * world.mdp.num_states), _MOST_STEPS),
-    )
+    return _of_world(world, say_name(world.name.rpartition("/")[2], arguments))
 
 
 def find_model(name: str) -> Model:
@@ -136,15 +123,50 @@ def find_model(name: str) -> Model:
     return tabular_model(name) if name.startswith(TABULAR) else gridworld_model(name)
 
 
-def _apart(text: str) -> tuple[str, dict[str, Any]]:
-    """Returns the name of a model and its arguments.
+def model_of(what: Any) -> Model | None:
+    """Returns the exact model that an object is or carries, None where there is none.
 
-    >>> _apart("ledge,slip=0.2")
-    ('ledge', {'slip': 0.2})
+    Args:
+        what: a gridworld, a model with or without words, or an environment with a transition table.
+
+    Raises:
+        InputError: the table is no model.
     """
-    name, *words = text.split(",")
-    return name, parse_arguments(words)
+    if isinstance(what, Model):
+        return what
+    if isinstance(what, Gridworld):
+        return _of_gridworld(what, what.grid.name)
+    if isinstance(what, TabularWorld):
+        return _of_world(what, what.name)
+    if isinstance(what, MDP):
+        return _of_world(TabularWorld(what, "a model", numbered(what.num_actions)), "a model")
+    base, spec = getattr(what, "unwrapped", None), getattr(what, "spec", None)
+    if isinstance(base, GridworldEnv):
+        model = _of_gridworld(base.world, base.world.grid.name, base.exploring_starts)
+        return replace(model, time_limit=spec.max_episode_steps if spec else None)
+    if hasattr(base, "P") or isinstance(getattr(base, "mdp", None), MDP):
+        world = tabular_world(what)
+        return _of_world(world, world.name)
+    return None
 
 
-def _together(name: str, arguments: Mapping[str, Any]) -> str:
-    return ",".join([name, *(say_arguments({key: arguments[key]}) for key in arguments)])
+def _of_gridworld(world: Gridworld, name: str, exploring_starts: bool = False) -> Model:
+    running = reachable(world.mdp) & ~world.mdp.terminal_states
+    rows, columns = world.grid.shape
+    return Model(
+        name=name,
+        world=world,
+        starts=running / running.sum() if exploring_starts else None,
+        time_limit=None,
+        usual_limit=max(_LEAST_STEPS, 4 * rows * columns),
+    )
+
+
+def _of_world(world: TabularWorld, name: str) -> Model:
+    return Model(
+        name=name,
+        world=world,
+        starts=world.starts,
+        time_limit=world.time_limit,
+        usual_limit=min(max(_LEAST_STEPS, 4 * world.mdp.num_states), _MOST_STEPS),
+    )

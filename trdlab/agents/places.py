@@ -1,19 +1,81 @@
 """Where an agent acts: its own environments, or others that it is put into."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
-from trdlab.agents.models import World, find_model, is_model
+from trdlab.agents.models import Model, World, find_model, is_model, model_of
 from trdlab.decomposition import TimeAxis
-from trdlab.environments import Environments
-from trdlab.environments.arguments import parse_arguments
-from trdlab.environments.stack import observation_space
+from trdlab.environments.arguments import parse_arguments, say_arguments
+from trdlab.environments.batches import Make
+from trdlab.environments.gym import GymEnvironments
+from trdlab.environments.interface import Interface
+from trdlab.environments.sources import EnvSource
 from trdlab.errors import InputError
-from trdlab.explain.copies import CopyableGymEnvironments
+from trdlab.tabular import MDP
 
-Make = Callable[[int, int], Environments]
-"""From the number of environments and their seed to the environments."""
+Where = EnvSource | Model | World | MDP
+"""What says where an agent acts."""
+
+AXIS = TimeAxis(0.95, 4)
+"""Of an exact table, where nothing is said."""
+
+
+def changed(
+    axis: TimeAxis, gamma: float | None, horizon: int | None, width: int | None
+) -> TimeAxis:
+    """Returns a time axis with those of γ, N and w in place that are given."""
+    return TimeAxis(
+        axis.gamma if gamma is None else gamma,
+        axis.horizon if horizon is None else horizon,
+        axis.width if width is None else width,
+    )
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How a user has named an agent and where it acts, so that it can be named again.
+
+    Args:
+        name: a run, or an exact model.
+        env: the environment it acts in.
+        env_arguments: what that is made with, as `KEY=VALUE`.
+        away: whether that is not its own.
+        time_axis: of an exact table; a run has its own.
+        module: what has to be imported for its environment, if anything.
+    """
+
+    name: str
+    env: str
+    env_arguments: tuple[str, ...] = ()
+    away: bool = False
+    time_axis: TimeAxis | None = None
+    module: str = ""
+
+    def at(self, other: "Origin") -> Self:
+        """Returns the same agent, where another one acts."""
+        away = (other.env, other.env_arguments) != (self.env, self.env_arguments)
+        return replace(
+            self, env=other.env, env_arguments=other.env_arguments, away=self.away or away
+        )
+
+    # What follows is the one place outside the command line that knows how it is written there.
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What names the agent on the command line."""
+        axis = self.time_axis or AXIS
+        own = (("--gamma", axis.gamma), ("--N", axis.horizon), ("--w", axis.width))
+        usual = (AXIS.gamma, AXIS.horizon, AXIS.width)
+        said = [(x, str(y)) for (x, y), z in zip(own, usual, strict=True) if y != z]
+        needed = ("--import", self.module) if self.module and not self.away else ()
+        place = self.place if self.away else ()
+        return (self.name, *(word for pair in said for word in pair), *needed, *place)
+
+    @property
+    def place(self) -> tuple[str, ...]:
+        """The options that name where it acts."""
+        return ("--env", self.env, *(x for a in self.env_arguments for x in ("--env-arg", a)))
 
 
 @dataclass(frozen=True)
@@ -22,39 +84,59 @@ class Place:
 
     Args:
         make: makes its environments.
-        words: the options that name it on the command line.
+        name: what it is called.
+        env_arguments: what it is made with, as `KEY=VALUE`.
+        is_named: whether it can be found again by its name.
     """
 
     make: Make
-    words: tuple[str, ...]
+    name: str
+    env_arguments: tuple[str, ...] = ()
+    is_named: bool = True
 
 
-def find_place(env: str, env_arguments: Sequence[str], time_axis: TimeAxis) -> Place:
-    """Returns the place of a name: an exact model, or a Gymnasium environment.
-
-    Their states can be copied, where that is possible.
+def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) -> Place:
+    """Returns the place of a name, or of an environment.
 
     Args:
-        env: `gridworld:NAME`, a map file, or `tabular:ENV_ID`, with arguments after commas; or the
-            id of a Gymnasium environment.
-        env_arguments: what to make the latter with, as `KEY=VALUE`.
+        env: `gridworld:NAME`, a map file, or `tabular:ENV_ID`, with arguments after commas; the id
+            of a Gymnasium environment; an environment, or a function that makes one; or a model.
+            An environment is acted in even where it carries a model.
+        env_arguments: what to make one of an id with, as `KEY=VALUE`.
         time_axis: of the agent; episodes of a model without a limit last four horizons or longer.
 
     Raises:
         InputError: there is no such model, or it is given arguments that are not in its name.
     """
-    words = ("--env", env, *(word for given in env_arguments for word in ("--env-arg", given)))
-    if not is_model(env):
-        arguments = parse_arguments(env_arguments)
+    model = model_of(env) if isinstance(env, Model | World | MDP) else None
+    if isinstance(env, str) and is_model(env):
+        refuse_arguments(env, env_arguments)
+        model = find_model(env)
+    if model is not None:
         return Place(
-            lambda num_envs, seed: CopyableGymEnvironments(
-                env, num_envs, seed=seed, env_arguments=arguments
-            ),
-            words,
+            lambda num_envs, seed: model.environments(num_envs, seed, time_axis),
+            env if isinstance(env, str) else model.name,
+            is_named=isinstance(env, str),
         )
-    refuse_arguments(env, env_arguments)
-    model = find_model(env)
-    return Place(lambda num_envs, seed: model.environments(num_envs, seed, time_axis), words)
+    source: Any = env
+    arguments = parse_arguments(env_arguments)
+    return Place(
+        lambda num_envs, seed: GymEnvironments(
+            source, num_envs, seed=seed, env_arguments=arguments
+        ),
+        source if isinstance(source, str) else "the environment",
+        tuple(env_arguments),
+        is_named=isinstance(source, str),
+    )
+
+
+def as_words(env_arguments: Mapping[str, Any]) -> tuple[str, ...]:
+    """Returns arguments of an environment as they are written, `KEY=VALUE`.
+
+    >>> as_words({"is_slippery": False, "map_name": "8x8"})
+    ('is_slippery=false', 'map_name=8x8')
+    """
+    return tuple(say_arguments({key: value}) for key, value in env_arguments.items())
 
 
 def refuse_arguments(name: str, env_arguments: Sequence[str]) -> None:
@@ -65,44 +147,15 @@ def refuse_arguments(name: str, env_arguments: Sequence[str]) -> None:
     """
     if env_arguments:
         raise InputError(
-            f"--env-arg is for Gymnasium environments, and '{name}' is an exact model.",
+            f"`env_arguments` are for Gymnasium environments, and '{name}' is an exact model.",
             f"Write {name},{','.join(env_arguments)}",
         )
 
 
-def check_fits(place: Place, world: World) -> None:
-    """Checks that the agent of a model sees and does in a place what it knows.
-
-    Args:
-        place: where it is to act.
-        world: its model.
-
-    Raises:
-        InputError: it does not.
-    """
+def look(place: Place) -> Interface:
+    """Returns what is seen and can be done in a place."""
     environments = place.make(1, 0)
     try:
-        names = environments.action_names or world.action_names
-        found = seen(environments), environments.num_actions, names
+        return Interface.of(environments)
     finally:
         environments.close()
-    own = f"{world.mdp.num_states} states", world.mdp.num_actions, world.action_names
-    if found != own:
-        raise InputError(
-            f"'{place.words[1]}' does not fit the agent: it has {_say(*found)}, "
-            f"and the agent knows {_say(*own)}.",
-            "Give an environment with the same ones.",
-        )
-
-
-def seen(environments: Environments) -> str:
-    """Returns what an agent sees of environments, in words."""
-    space: Any = observation_space(environments)
-    if hasattr(space, "n"):
-        return f"{space.n} states"
-    return f"{'×'.join(map(str, space.shape)) or '1'} {space.dtype}"
-
-
-def _say(observation: str, num_actions: int, names: Sequence[str]) -> str:
-    named = f" ({', '.join(names)})" if len(names) == num_actions else ""
-    return f"{observation} and {num_actions} actions{named}"

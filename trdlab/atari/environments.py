@@ -10,7 +10,7 @@ from trdlab.arrays import BoolArray, IntArray
 from trdlab.atari.names import find_game
 from trdlab.atari.vector import FRAME, FRAMES_PER_SECOND, STACK, action_names, make_vector
 from trdlab.environments.history import Histories, checked_actions
-from trdlab.environments.protocol import Frames, NotCopyable, NotReproducible, Padding, Step
+from trdlab.environments.protocol import Frames, NotCopyable, Padding, Step
 
 RESEED_AFTER = 5000
 """Steps after which a game is seeded anew at the end of its episode.
@@ -53,6 +53,7 @@ class AtariEnvironments:
 
     observation_space: gym.Space[Any] = FRAME
     first_action = 0
+    shared_chance = False
     stack: int | None = STACK
     padding: Padding = "zero"
     frames_per_second: float | None = FRAMES_PER_SECOND
@@ -93,14 +94,19 @@ class AtariEnvironments:
         everyone = np.ones(self.num_envs, dtype=np.bool_)
         return self._begin(everyone, [self._histories.begin(env) for env in range(self.num_envs)])
 
-    def step(self, actions: IntArray) -> Step:
+    def step(self, actions: IntArray, active: BoolArray | None = None) -> Step:
         """Takes actions `[B]`; where a game ends, the next one begins in the same call.
+
+        Args:
+            actions: `[B]`.
+            active: `[B]`, which games act; by default all. ale-py plays the others too, but nothing
+                is told of them, and none of their resets is a seeded one.
 
         Raises:
             InputError: there are not B actions, or one does not exist.
         """
         # checked here: an action that does not exist would hang ale-py's threads
-        return self._act(checked_actions(actions, self.num_envs, self.num_actions))
+        return self._act(checked_actions(actions, self.num_envs, self.num_actions), active)
 
     def state_dict(self) -> dict[str, Any]:
         """Returns the seeds of the last seeded resets, and the actions taken since.
@@ -132,13 +138,13 @@ class AtariEnvironments:
         two copies differ.
 
         Raises:
-            NotCopyable: actions are sticky; a copy would repeat the chance of the game.
-            NotReproducible: a game does not do again what it did.
+            NotCopyable: actions are sticky, so that a copy would repeat the chance of the game; or
+                a game does not do again what it did.
         """
         if self._options["sticky"]:
             raise NotCopyable(
                 f"{self.game} has sticky actions, whose chance a copy would repeat.",
-                "Play without them, or ask for no ceiling and no foils.",
+                "Play without them, or judge it without copies of its states.",
             )
         copies = AtariEnvironments(self.game, len(which), seed=seed, **self._options)
         past = [self._histories.past(env) for env in which.tolist()]
@@ -150,22 +156,30 @@ class AtariEnvironments:
         copies._play_again([actions for _, actions in past], begin)
         for copy, env in enumerate(which.tolist()):
             if not copies._histories.same(copy, self._histories, env):
-                raise NotReproducible(
+                raise NotCopyable(
                     f"{self.game} did something else when it was played again.",
-                    "Ask for no ceiling and no foils.",
+                    "Judge it without copies of its states.",
                 )
         return copies
 
     def close(self) -> None:
         """Nothing: ale-py's threads end with the object."""
 
-    def _act(self, actions: IntArray) -> Step:
+    def _act(self, actions: IntArray, active: BoolArray | None = None) -> Step:
         observations, paid, terminated, truncated, info = self._envs.step(actions)
         frames, rewards = observations[:, 0], paid.astype(np.float64)  # [B, 84, 84], [B]
-        for env, action in enumerate(actions.tolist()):
-            self._histories.record_step(env, action, frames, rewards)
+        acts = np.ones(self.num_envs, dtype=np.bool_) if active is None else active
+        rewards, terminated, truncated = (
+            np.where(acts, rewards, 0.0),
+            terminated & acts,
+            truncated & acts,
+        )
+        for env in np.flatnonzero(acts).tolist():
+            self._histories.record_step(env, int(actions[env]), frames, rewards)
         ended, lives = terminated | truncated, info["lives"]
-        life_lost = (lives < self._lives) & (lives > 0) & ~ended  # [B]; lives can also be won
+        life_lost = (
+            (lives < self._lives) & (lives > 0) & ~ended & acts
+        )  # [B]; lives can also be won
         self._lives, following = lives, frames
         if ended.any():
             following = self._begin(

@@ -1,10 +1,14 @@
 """The command line: parse, call, print."""
 
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any
 
-from trdlab.errors import TrdlabError
+from trdlab.errors import NotImported, TrdlabError
+
+_OPTIONS = {"horizon": "--N", "width": "--w", "parts": "--what", "env_arguments": "--env-arg"}
+"""Of arguments that are called otherwise on the command line."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -20,7 +24,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except TrdlabError as error:
         if {"-v", "--verbose"} & set(words):
             raise
-        _fail(f"{error.cause} {error.cure}".strip(), error.exit_code)
+        cure = error.cure
+        if isinstance(error, NotImported):
+            cure = f"If you trust it, add: --import {error.module}"
+        _fail(as_options(f"{error.cause} {cure}".strip()), error.exit_code)
     except usage_error as error:
         if not error.format_message():  # no command was given, and the help has been printed
             sys.exit(2)
@@ -37,6 +44,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _fail(f"The output cannot be written: {error.strerror or error}.", 1)
     else:
         sys.exit(code or 0)
+
+
+def as_options(message: str) -> str:
+    """Returns a message of the library as the command line says it: with options for arguments.
+
+    >>> as_options("Ask for `episodes=50`, or leave out `horizon` and `max_steps`.")
+    'Ask for --episodes 50, or leave out --N and --max-steps.'
+    """
+
+    def option(found: re.Match[str]) -> str:
+        name, value = found[1], found[2]
+        flag = _OPTIONS.get(name, "--" + name.replace("_", "-"))
+        return flag if value in (None, "True") else f"{flag} {value}"
+
+    return re.sub(r"`([A-Za-z_]+)(?:=([^`]*))?`", option, message)
 
 
 def _fail(message: str, code: int) -> None:

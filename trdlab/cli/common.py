@@ -1,8 +1,9 @@
 """What the commands that explain a solved model share: their options, and how they print."""
 
 import json
+import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +12,7 @@ import typer
 from rich.console import Console
 
 if TYPE_CHECKING:
-    from trdlab.show.report import Report
+    from rich.text import Text
 
 
 class Ties(StrEnum):
@@ -51,6 +52,32 @@ MaxSteps = Annotated[
         show_default="1000, or four horizons",
     ),
 ]
+Details = Annotated[bool, typer.Option("--details", help="Tell all there is to tell.")]
+
+
+def _import(modules: list[str] | None) -> list[str] | None:
+    from trdlab.environments.making import import_named
+    from trdlab.errors import InputError
+
+    for module in modules or ():
+        try:
+            import_named(module)
+        except Exception as error:
+            raise InputError(
+                f"'{module}' cannot be imported: {error}.", "Check its name, or correct it."
+            ) from error
+    return modules
+
+
+Import = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--import",
+        metavar="MODULE",
+        callback=_import,
+        help="Import it first: a run's own environment may need it.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Show tracebacks.")]
 
@@ -74,32 +101,78 @@ def print_json(data: object) -> None:
 
 
 def publish(
-    solve: Callable[[], "Report"], *, plot: Path | None, overwrite: bool, as_json: bool
+    make: Callable[[], Any],
+    *,
+    plot: Path | None,
+    overwrite: bool,
+    as_json: bool,
+    details: bool,
+    further: Callable[[Any], str] = lambda _: "",
 ) -> None:
-    """Prints a report as a page or as JSON, and writes its picture.
+    """Prints a noun of trdlab as a page or as JSON, and writes its picture.
 
     Args:
-        solve: makes the report; called once the picture is known to be writable.
+        make: makes it; called once the picture is known to be writable.
         plot: where the picture goes.
         overwrite: whether it may replace a file.
         as_json: whether to print JSON.
+        details: whether to print all there is to tell.
+        further: returns a command that shows more; it is told after the page.
     """
-    from trdlab.show import report as show
-
     if plot is not None:
-        from trdlab.show.plots.moment import check_picture
+        from trdlab.show.plots.style import check_picture
 
         check_picture(plot, overwrite=overwrite)
-    report = solve()
+    thing = make()
     if as_json:
-        print_json(show.to_dict(report))
+        print_json(thing.to_dict())
     else:
-        console, ascii_only = new_console()
-        console.print(show.page(report, ascii_only=ascii_only))
+        print_page(thing, details=details)
+        if hint := further(thing):
+            print_line(f"Try: {hint}", "dim")
     if plot is not None:
-        from trdlab.show.plots.moment import save_report
+        from trdlab.show.plots.style import save
 
-        save_report(report, plot)
+        save(thing.plot(), plot)
         Console(stderr=True, highlight=False).print(
             f"Picture: {plot}", soft_wrap=True, markup=False
         )
+
+
+def command(words: Sequence[str | float], options: Mapping[str, str | float | None]) -> str:
+    """Returns a command of trdlab as it is typed, with those of some options that were given.
+
+    Args:
+        words: what stands behind `trdlab`; a command made here may be the first of them.
+        options: their values, None where they were not given.
+    """
+    from trdlab.formatting import plain
+
+    told = [word for name, value in options.items() if value is not None for word in (name, value)]
+    typed = [word if isinstance(word, str) else plain(word) for word in [*words, *told]]
+    if typed[0].startswith("trdlab "):
+        return f"{typed[0]} {shlex.join(typed[1:])}"
+    return shlex.join(["trdlab", *typed])
+
+
+def print_page(thing: Any, *, details: bool) -> None:
+    """Prints a noun of trdlab as people read it."""
+    from trdlab.show.text import text
+
+    _print(text(thing, details=details))
+
+
+def print_line(line: str, style: str = "") -> None:
+    """Prints a line, wrapped to the terminal."""
+    from trdlab.show.text import columns, wrapped
+
+    for part in wrapped(line, columns(), style):
+        _print(part)
+
+
+def _print(shown: "Text") -> None:
+    from trdlab.show.text import columns, plain_ascii
+
+    console, ascii_only = new_console()
+    console.width = columns()  # where a terminal says it has none, rich prints nothing
+    console.print(plain_ascii(shown) if ascii_only else shown, soft_wrap=True)

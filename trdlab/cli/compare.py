@@ -46,6 +46,8 @@ def compare(
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first episode.")] = 0,
     max_steps: common.MaxSteps = None,
+    modules: common.Import = None,
+    details: common.Details = False,
     as_json: common.AsJson = False,
     out: Annotated[Path | None, common.pictures_option("without --json")] = None,
     verbose: common.Verbose = False,
@@ -54,11 +56,11 @@ def compare(
 
     Both play episodes, and both are asked about the states of them all.
     """
+    from trdlab.agents.naming import find_pair
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explanations.comparison import compare as two
-    from trdlab.show import comparison as show
+    from trdlab.explanations.comparison import comparing as two
 
-    agents = two.find_pair(
+    agents = find_pair(
         (first, second),
         gamma=gamma,
         horizon=horizon,
@@ -71,24 +73,23 @@ def compare(
 
         out = free_name(Path("explanations"), f"{agents[0].name}-against-{agents[1].name}")
     if out is not None:
-        from trdlab.show.plots.comparison import picture_path
+        from trdlab.show.plots.comparison import NAME
+        from trdlab.show.plots.style import check_pictures
 
-        path = picture_path(out)
+        path = out / NAME
+        check_pictures([path])
     errors = Console(stderr=True, highlight=False)
     with EpisodeProgress(errors, "Getting ready") as progress:
         found = two.compare(
             *agents, episodes=episodes, max_steps=max_steps, seed=seed, watch=progress.on_progress
         )
     if as_json:
-        from trdlab.show.comparison_data import comparison_to_dict
-
-        common.print_json(comparison_to_dict(found))
+        common.print_json(found.to_dict())
     else:
-        console, ascii_only = common.new_console()
-        console.print(show.page(found, ascii_only=ascii_only))
+        common.print_page(found, details=details)
     if out is not None:
         from trdlab.show.plots.comparison import comparison_figure
-        from trdlab.show.plots.pictures import write_picture
+        from trdlab.show.plots.style import save
 
-        write_picture(comparison_figure(found), path)
+        save(comparison_figure(found), path)
         errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

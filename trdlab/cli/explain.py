@@ -67,6 +67,8 @@ def explain(
         ),
     ] = None,
     max_steps: common.MaxSteps = None,
+    modules: common.Import = None,
+    details: common.Details = False,
     as_json: common.AsJson = False,
     out: Annotated[Path | None, common.pictures_option("without --what and --json")] = None,
     verbose: common.Verbose = False,
@@ -76,23 +78,17 @@ def explain(
     It plays an episode as the agent would, and explains one step of it.
     How far such forecasts can be trusted is judged by other episodes.
     """
-    from trdlab.agents.agent import find_agent
+    from trdlab.agents.naming import find_agent
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.decomposition import TimeAxis
-    from trdlab.explanations.explained import explain_agent, parse_parts
-    from trdlab.show import explained as show
+    from trdlab.explanations.explanation import explain as explain_agent
+    from trdlab.explanations.explanation import parse_parts
 
     parts = parse_parts(what)
-    own_axis = gamma is not None or horizon is not None or width is not None
     found = find_agent(
         agent,
-        time_axis=TimeAxis(
-            0.95 if gamma is None else gamma,
-            4 if horizon is None else horizon,
-            1 if width is None else width,
-        )
-        if own_axis
-        else None,
+        gamma=gamma,
+        horizon=horizon,
+        width=width,
         env=env,
         env_arguments=env_arguments or (),
     )
@@ -101,7 +97,7 @@ def explain(
 
         out = free_name(Path("explanations"), found.name)
     if out is not None:
-        from trdlab.show.plots.explained import picture_paths
+        from trdlab.show.plots.figures import picture_paths
 
         paths = picture_paths(out, parts, seed=seed, step=step)
     errors = Console(stderr=True, highlight=False)
@@ -118,12 +114,11 @@ def explain(
             watch=progress.on_progress,
         )
     if as_json:
-        common.print_json(show.to_dict(explained))
+        common.print_json(explained.to_dict())
     else:
-        console, ascii_only = common.new_console()
-        console.print(show.page(explained, ascii_only=ascii_only))
+        common.print_page(explained, details=details)
     if out is not None:
-        from trdlab.show.plots.explained import write_pictures
+        from trdlab.show.plots.figures import write_pictures
 
         for path in write_pictures(explained, paths):
             errors.print(f"Picture: {path}", soft_wrap=True, markup=False)

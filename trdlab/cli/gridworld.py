@@ -6,7 +6,7 @@ import typer
 
 from trdlab.cli import common
 from trdlab.cli.common import Ties
-from trdlab.gridworld import map_names
+from trdlab.gridworld import Gridworld, load_map, map_names
 
 
 def gridworld(
@@ -36,6 +36,7 @@ def gridworld(
     ties: common.WhoseTies = Ties.LOWEST,
     plot: common.Plot = None,
     overwrite: common.Overwrite = False,
+    details: common.Details = False,
     as_json: common.AsJson = False,
     list_maps: Annotated[bool, typer.Option("--list", help="List the built-in maps.")] = False,
     verbose: common.Verbose = False,
@@ -45,21 +46,38 @@ def gridworld(
     Component 0 is the reward of the action taken now; the last component, the residual, holds all
     that comes after N*w steps.
     """
-    from trdlab.show import gridworld as show
-
-    if list_maps and as_json:
-        common.print_json(show.map_entries())
-        return
     if list_maps:
-        console, ascii_only = common.new_console()
-        console.print(show.map_list(ascii_only=ascii_only))
+        _list_maps(as_json=as_json)
         return
+    from trdlab.explanations.solved import SolvedState, solve_gridworld
+    from trdlab.time_axis import TimeAxis
+
+    axis = TimeAxis(gamma, horizon, width)
+    given = {
+        "--slip": slip,
+        "--treasure": treasure,
+        "--state": None if state == "0" else state,
+        "--action": action,
+        "--foil": foil,
+        "--ties": None if ties is Ties.LOWEST else ties.value,
+    }
+
+    def further(solved: SolvedState) -> str:
+        """Returns a command that shows something new about this very map, all else being equal."""
+        base = common.command(["gridworld", "--map", map_name, "--gamma", gamma], given)
+        if axis.width > 1:
+            return f"{base} --N {axis.num_steps} --w 1 (the same steps one by one)"
+        assert isinstance(solved.world, Gridworld)
+        treasures = [source.value for source in solved.world.sources if source.kind == "treasure"]
+        if treasures and treasure is None and state == "0":
+            richer = common.command([base], {"--treasure": treasures[0] + 1.0})
+            return f"{richer} --N {axis.horizon}"
+        return f"{base} --N {2 * axis.horizon + 2} (a longer horizon)"
+
     common.publish(
-        lambda: show.report(
+        lambda: solve_gridworld(
             map_name,
-            gamma=gamma,
-            horizon=horizon,
-            width=width,
+            axis,
             slip=slip,
             treasure=treasure,
             state=state,
@@ -70,4 +88,24 @@ def gridworld(
         plot=plot,
         overwrite=overwrite,
         as_json=as_json,
+        details=details,
+        further=further,
     )
+
+
+def _list_maps(*, as_json: bool) -> None:
+    """Prints the built-in maps and what they teach."""
+    entries = []
+    for name in map_names():
+        grid = load_map(name)
+        rows, columns = grid.shape
+        states = len(Gridworld(grid).states)
+        entries.append(
+            {"name": name, "rows": rows, "columns": columns, "states": states, "title": grid.title}
+        )
+    if as_json:
+        common.print_json(entries)
+        return
+    for entry in entries:
+        size = f"{entry['rows']} x {entry['columns']}"
+        common.print_line(f"{entry['name']:10}{size:9}{entry['title']}")

@@ -1,5 +1,6 @@
 """How long work is watched, and stopped: a bar on a terminal, now and then a line elsewhere."""
 
+import os
 import signal
 import time
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 _LINE_SECONDS = 10.0
 _BAR_SECONDS = 0.1
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_HANGUP = getattr(signal, "SIGHUP", None)  # Windows has none
 
 
 class Stop:
@@ -30,16 +31,25 @@ class Stop:
 
 @contextmanager
 def stopping() -> Iterator[Stop]:
-    """Turns Ctrl-C and SIGTERM into a request; the second one ends the process at once."""
-    stop = Stop()
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    """Turns Ctrl-C, SIGTERM and a closed terminal into a request; a second one ends it at once.
+
+    What is ignored stays so: `nohup` asks for that.
+    """
+    stop, terminals = Stop(), [stream for stream in (1, 2) if os.isatty(stream)]
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if _HANGUP is not None and signal.getsignal(_HANGUP) != signal.SIG_IGN:
+        numbers.append(_HANGUP)
+    before = {number: signal.getsignal(number) for number in numbers}
 
     def ask(number: int, frame: FrameType | None) -> None:
         stop.code = 128 + number
-        for each in _SIGNALS:
+        for each in numbers:
             signal.signal(each, before[each])
+        if number == _HANGUP:  # whoever writes to a closed terminal fails
+            for stream in terminals:
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
-    for number in _SIGNALS:
+    for number in numbers:
         signal.signal(number, ask)
     try:
         yield stop
@@ -108,14 +118,15 @@ class TrainingProgress:
 
 
 class EpisodeProgress:
-    """Shows how far episodes are that are played, on a terminal only.
+    """Shows how far episodes are that are played.
 
     Args:
-        console: where to.
-        begin: what is shown before the first one is played.
+        console: where to; a line that changes if it is a terminal, otherwise one now and then.
+        begin: what a terminal shows before the first one is played.
     """
 
     def __init__(self, console: Console, begin: str = "Evaluating") -> None:
+        self._console, self._shown = console, time.monotonic()
         self._status = console.status(begin) if console.is_terminal else None
 
     def __enter__(self) -> "EpisodeProgress":
@@ -127,15 +138,14 @@ class EpisodeProgress:
         if self._status is not None:
             self._status.stop()
 
-    def on_episode(self, finished: int) -> None:
-        """Shows how many have finished."""
-        if self._status is not None:
-            self._status.update(f"Evaluating: {finished} episodes have finished")
-
     def on_progress(self, progress: "Playing") -> None:
-        """Shows how far episodes are that are played to explain an agent."""
+        """Shows how far episodes are, if it is time to."""
+        line = (
+            f"Playing {progress.what}: step {progress.steps:,}, {progress.finished} of "
+            f"{progress.episodes} are over"
+        )
         if self._status is not None:
-            self._status.update(
-                f"Playing {progress.what}: step {progress.steps:,}, {progress.finished} of "
-                f"{progress.episodes} are over"
-            )
+            self._status.update(line)
+        elif time.monotonic() - self._shown >= _LINE_SECONDS:
+            self._shown = time.monotonic()
+            self._console.print(line, soft_wrap=True, markup=False)

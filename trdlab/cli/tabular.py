@@ -7,6 +7,8 @@ import typer
 from trdlab.cli import common
 from trdlab.cli.common import Ties
 
+_VARIANTS = ("is_slippery", "is_rainy")
+
 
 def _complete(incomplete: str) -> list[str]:
     from trdlab.tabular.toytext import toy_text_ids
@@ -50,6 +52,7 @@ def tabular(
     ties: common.WhoseTies = Ties.LOWEST,
     plot: common.Plot = None,
     overwrite: common.Overwrite = False,
+    details: common.Details = False,
     as_json: common.AsJson = False,
     verbose: common.Verbose = False,
 ) -> None:
@@ -60,22 +63,43 @@ def tabular(
     Component 0 is the reward of the action taken now; the last component,
     the residual, holds all that comes after N*w steps.
     """
-    from trdlab.environments.arguments import parse_arguments
-    from trdlab.show import tabular as show
+    from trdlab.environments.arguments import parse_arguments, say_arguments
+    from trdlab.explanations.solved import SolvedState, solve_tabular
+    from trdlab.tabular.named import TabularWorld
+    from trdlab.time_axis import TimeAxis
+
+    axis, arguments = TimeAxis(gamma, horizon, width), parse_arguments(env_arguments or [])
+    given = {
+        "--state": state,
+        "--action": action,
+        "--foil": foil,
+        "--ties": None if ties is Ties.LOWEST else ties.value,
+    }
+
+    def further(solved: SolvedState) -> str:
+        """Returns a command that shows something new about this very environment."""
+        assert isinstance(solved.world, TabularWorld)
+        varied = dict(arguments)
+        new = [name for name in _VARIANTS if name in solved.world.arguments and name not in varied]
+        if axis.width == 1 and new and state is None:
+            varied[new[0]] = not solved.world.arguments[new[0]]
+        words: list[str | float] = ["tabular", env_id]
+        for name, value in varied.items():
+            words += ["--env-arg", say_arguments({name: value})]
+        base = common.command([*words, "--gamma", gamma], given)
+        if axis.width > 1:
+            return f"{base} --N {axis.num_steps} --w 1 (the same steps one by one)"
+        if varied != arguments:
+            return f"{base} --N {axis.horizon}"
+        return f"{base} --N {2 * axis.horizon + 2} (a longer horizon)"
 
     common.publish(
-        lambda: show.report(
-            env_id,
-            parse_arguments(env_arguments or []),
-            gamma=gamma,
-            horizon=horizon,
-            width=width,
-            state=state,
-            action=action,
-            foil=foil,
-            ties=ties.value,
+        lambda: solve_tabular(
+            env_id, axis, arguments, state=state, action=action, foil=foil, ties=ties.value
         ),
         plot=plot,
         overwrite=overwrite,
         as_json=as_json,
+        details=details,
+        further=further,
     )

@@ -92,7 +92,12 @@ def train_atari(
     _train("atari", game, preset, config, out, dry_run, given or {})
 
 
-def resume(run: RunPath, checkpoint: Checkpoint = None, verbose: common.Verbose = False) -> None:
+def resume(
+    run: RunPath,
+    checkpoint: Checkpoint = None,
+    modules: common.Import = None,
+    verbose: common.Verbose = False,
+) -> None:
     """Go on with a run that was stopped, exactly as if it had not been."""
     from trdlab.training.run import resume as pick_up
 
@@ -116,7 +121,17 @@ def evaluate(
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")] = 1000,
+    max_steps: Annotated[
+        int | None,
+        typer.Option(
+            "--max-steps",
+            min=1,
+            help="After which an episode is cut off, if not before.",
+            show_default="the environment's limit, or else 1000 or four horizons",
+        ),
+    ] = None,
     checkpoint: Checkpoint = None,
+    modules: common.Import = None,
     as_json: common.AsJson = False,
     verbose: common.Verbose = False,
 ) -> None:
@@ -136,14 +151,15 @@ def evaluate(
             epsilon=epsilon,
             seed=seed,
             step=checkpoint,
-            on_episode=progress.on_episode,
+            max_steps=max_steps,
+            watch=progress.on_progress,
         )
     if as_json:
         common.print_json(result.to_dict())
     else:
         console, ascii_only = common.new_console()
         console.print(evaluation_page(result, ascii_only=ascii_only))
-    _say(errors, f"Kept: {kept}")
+    _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
 
 
 def runs(
@@ -161,7 +177,7 @@ def runs(
     from trdlab.show.training import runs_table
 
     if plot is not None:
-        from trdlab.show.plots.moment import check_picture
+        from trdlab.show.plots.style import check_picture
 
         check_picture(plot, overwrite=overwrite)
     console, ascii_only = common.new_console()
@@ -171,9 +187,10 @@ def runs(
         return
     console.print(runs_table(found, ascii_only=ascii_only))
     if plot is not None:
-        from trdlab.show.plots.training import save_learning_curves
+        from trdlab.show.plots.style import save
+        from trdlab.show.plots.training import curves_figure
 
-        save_learning_curves([run.path for run in found if run.fault is None], plot)
+        save(curves_figure([run.path for run in found if run.fault is None]), plot)
         _say(_errors(), f"Picture: {plot}")
 
 
@@ -187,7 +204,7 @@ def _train(
     given: dict[str, Any],
 ) -> None:
     from trdlab.training.run import begin
-    from trdlab.training.setup import default_path, plan, read_settings
+    from trdlab.training.setup import plan, read_settings
 
     settings = read_settings(kind, env, preset_name, config, given)
     if dry_run:
@@ -197,16 +214,14 @@ def _train(
         page = plan_page(plan(settings), ascii_only=ascii_only)
         console.print(page, soft_wrap=True)  # so that the configuration can be copied
         return
-    _carry_on(lambda: begin(settings, out or default_path(settings)))
+    _carry_on(lambda: begin(settings, out))
 
 
 def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
     """Trains a run to its end or to the next signal, and evaluates it at the end."""
-    from shlex import quote
-
     from trdlab.cli.progress import TrainingProgress, stopping
     from trdlab.deep.memory import available_memory
-    from trdlab.show.training import duration, memory_line
+    from trdlab.show.training import duration, memory_line, updates_lines
     from trdlab.training.run import carry_on
 
     errors = _errors()
@@ -214,6 +229,8 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
         path, settings = run.folder.path, run.trainer.settings
         _say(errors, f"Run: {path}")
         _say(errors, memory_line(run.memory, available_memory()))
+        for line in updates_lines(settings):
+            _say(errors, line)
         if run.problem is not None:
             _say(errors, f"{run.problem.cause} New episodes are begun in their place.")
         with TrainingProgress(errors, settings.agent_steps, run.trainer.agent_steps) as progress:
@@ -226,7 +243,7 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
         steps = run.trainer.agent_steps
         if not done:
             _say(errors, f"Stopped and saved at {steps:,} agent steps.")
-            _say(errors, f"Go on: trdlab resume {quote(str(path))}")
+            _say(errors, f"Go on: {run.folder.resume_command}")
             raise typer.Exit(stop.code or 0)
     _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
     if settings.evaluate_episodes:

@@ -159,7 +159,7 @@ class TrainSettings:
         self.update_settings  # noqa: B018  checks the rest
         if self.learning_starts < self.width * self.num_envs:
             raise InputError(
-                f"--learning-starts is {self.learning_starts}: not one window of w = {self.width} "
+                f"`learning_starts` is {self.learning_starts}: not one window of w = {self.width} "
                 f"steps is full by then.",
                 f"Choose {self.width * self.num_envs} or more.",
             )
@@ -276,4 +276,4 @@ _PLURAL = {int: "whole numbers", str: "texts"}
 
 def _require(holds: bool, name: str, value: object, range_: str) -> None:
     if not holds:
-        raise InputError(f"--{name.replace('_', '-')} is {value}.", f"It must be {range_}.")
+        raise InputError(f"`{name}` is {value}.", f"It must be {range_}.")

@@ -177,7 +177,6 @@ class Trainer:
     def state_dict(self) -> dict[str, Any]:
         """Returns everything that the rest of the run depends on: plain numbers, arrays, bytes."""
         return {
-            "settings": self.settings.to_config(),
             "progress": {
                 "agent_steps": self.agent_steps,
                 "losses": self._losses,

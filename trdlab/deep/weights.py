@@ -28,8 +28,8 @@ def read_weights(path: str | Path) -> dict[str, npt.NDArray[Any]]:
             `model` or `weights`.
 
     Raises:
-        InputError: it cannot be read, or holds anything else. A pickle with code is refused, and
-            the code is not executed.
+        InputError: it cannot be read, or holds anything else, or what is no finite number. A
+            pickle with code is refused, and the code is not executed.
     """
     path = Path(path)
     try:
@@ -47,7 +47,14 @@ def read_weights(path: str | Path) -> dict[str, npt.NDArray[Any]]:
         raise InputError(
             f"'{path}' is torn, or holds no weights.", "Name a .safetensors file or a state dict."
         ) from error
-    return {name: _array(weight) for name, weight in _state_dict(held, path).items()}
+    weights = {name: _array(weight) for name, weight in _state_dict(held, path).items()}
+    for name, weight in weights.items():
+        finite = np.isfinite(weight)
+        if not finite.all():
+            raise InputError(
+                f"'{path}' has {weight[~finite][0]} in '{name}'.", "Name other weights."
+            )
+    return weights
 
 
 def _unpickled(path: Path) -> Any:

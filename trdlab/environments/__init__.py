@@ -6,6 +6,7 @@ from trdlab.environments.protocol import (
     CopyableEnvironments,
     Environments,
     NotCopyable,
+    NotParallel,
     NotReproducible,
     Padding,
     Step,
@@ -13,6 +14,7 @@ from trdlab.environments.protocol import (
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
+    from trdlab.environments.batches import in_batches
     from trdlab.environments.gym import GymEnvironments
     from trdlab.environments.making import make_environment
 
@@ -21,13 +23,16 @@ __all__ = [
     "Environments",
     "GymEnvironments",
     "NotCopyable",
+    "NotParallel",
     "NotReproducible",
     "Padding",
     "Step",
+    "in_batches",
     "make_environment",
 ]
 
 _HOMES = {
+    "in_batches": "batches",
     "GymEnvironments": "gym",
     "make_environment": "making",
 }

@@ -1,19 +1,32 @@
 """Gymnasium environments, stepped one after the other."""
 
 from collections.abc import Mapping
-from typing import Any
+from copy import copy
+from dataclasses import replace
+from typing import Any, Self
 
-import gymnasium as gym
 import numpy as np
-import numpy.typing as npt
 
-from trdlab.arrays import IntArray
+from trdlab.arrays import BoolArray, IntArray
+from trdlab.environments.answers import observation_of, outcome_of
+from trdlab.environments.aside import aside
+from trdlab.environments.chance import generators, kept_luck, own_chance, renew
+from trdlab.environments.copies import (
+    COMPARED,
+    LEAST,
+    Env,
+    NoDeepCopy,
+    Past,
+    Proof,
+    copied,
+    prove,
+)
 from trdlab.environments.history import Histories, checked_actions
-from trdlab.environments.making import make_environment
-from trdlab.environments.protocol import Frames, Padding, Step
+from trdlab.environments.naming import action_names
+from trdlab.environments.protocol import Frames, NotCopyable, Padding, Step
+from trdlab.environments.sources import EnvSource, Source
+from trdlab.environments.spaces import discrete_actions, frame_space, is_image
 from trdlab.errors import InputError
-
-_CHANNELS = (1, 3, 4)
 
 
 class GymEnvironments:
@@ -21,17 +34,20 @@ class GymEnvironments:
 
     Every episode begins with a seeded reset, so that any moment of it can be restored from that
     seed and the actions since. Images become channels first; grey ones `(H, W)` are single frames,
-    seen as `[B, 1, H, W]` (`stack` is 1).
+    seen as `[B, 1, H, W]` (`stack` is 1). What they print goes to stderr.
 
     Args:
-        env_id: as for `make_environment`.
+        env: a Gymnasium id, such as `CartPole-v1`, or `module:id` to import a module first; a
+            function that makes an environment; or an environment, which is reset, copied, and left
+            open (see `Source`).
         num_envs: B.
         seed: what all seeds are drawn from.
-        env_arguments: what to make them with.
+        env_arguments: what to make those of an id with.
 
     Raises:
         InputError: the environment cannot be made, its actions are not discrete, or no network
             reads its observations.
+        NotParallel: one can be made, and not B beside each other.
 
     >>> import numpy as np
     >>> environments = GymEnvironments("CartPole-v1", 2, seed=0)
@@ -46,29 +62,26 @@ class GymEnvironments:
 
     def __init__(
         self,
-        env_id: str,
+        env: EnvSource,
         num_envs: int = 1,
         *,
         seed: int,
         env_arguments: Mapping[str, Any] | None = None,
     ) -> None:
-        arguments = dict(env_arguments or {})
-        settings = {"env_id": env_id, "arguments": arguments}
-        self._histories = Histories(settings, num_envs=num_envs, seed=seed)
-        self._envs = [make_environment(env_id, arguments) for _ in range(num_envs)]
-        env = self._envs[0]
-        self.env_id, self.num_envs = env_id, num_envs
-        actions = _checked_actions(env, env_id)
-        self.num_actions, self.first_action = int(actions.n), int(actions.start)
-        self.action_names = _action_names(env, self.num_actions)
-        self._space = env.observation_space
-        self.observation_space = frame_space(self._space, env_id)
-        self._channels_last = self.observation_space.shape != self._space.shape
-        grey = _is_image(self._space) and len(self._space.shape or ()) == 2
-        self.stack = 1 if grey else None
-        self.time_limit = env.spec.max_episode_steps if env.spec else None
-        self.frames_per_second: float | None = env.metadata.get("render_fps")
+        self._source, self.num_envs = Source(env, env_arguments), num_envs
+        self._envs = self._source.make(num_envs)
+        self.name = self._source.name
+        settings = {"env_id": self.name, "arguments": dict(env_arguments or {})}
+        try:
+            self._histories = Histories(settings, num_envs=num_envs, seed=seed)
+            self._look_at(self._envs[0])
+        except InputError:
+            self.close()
+            raise
+        self.shared_chance, self._is_copy = False, False
+        self._proof: Proof | None = None
 
+    @aside()
     def reset(self) -> Frames:
         """Begins an episode in every environment, and returns their first frames `[B, ...]`."""
         frames = self._blank_frames()
@@ -76,15 +89,23 @@ class GymEnvironments:
             self._begin(env, frames)
         return frames
 
-    def step(self, actions: IntArray) -> Step:
+    @aside()
+    def step(self, actions: IntArray, active: BoolArray | None = None) -> Step:
         """Takes actions `[B]`; where an episode ends, the next one begins in the same call.
 
+        Args:
+            actions: `[B]`.
+            active: `[B]`, which environments act; by default all. The others are left as they are.
+
         Raises:
-            InputError: there are not B actions, or one does not exist.
+            InputError: there are not B actions, one does not exist, or an environment answers as
+                none should.
         """
+        taken = checked_actions(actions, self.num_envs, self.num_actions).tolist()
         step = self._blank_step()
-        for env, action in enumerate(checked_actions(actions, self.num_envs, self.num_actions)):
-            self._act(env, action, step)
+        acting = range(self.num_envs) if active is None else np.flatnonzero(active).tolist()
+        for env in acting:
+            self._act(env, taken[env], step)
         return step
 
     def state_dict(self) -> dict[str, Any]:
@@ -95,6 +116,7 @@ class GymEnvironments:
         """
         return self._histories.state_dict()
 
+    @aside()
     def load_state_dict(self, state: Mapping[str, Any]) -> Frames:
         """Plays the saved episodes again; returns the frames the next action is chosen at.
 
@@ -105,39 +127,142 @@ class GymEnvironments:
         step = self._blank_step()
         for env, (seeding, actions) in enumerate(self._histories.saved(state)):
             self._begin(env, step.following, seeding)
-            for action in actions:
+            for action in actions.tolist():
                 self._act(env, action, step)
-        self._histories.verify(state, self.env_id)
+        self._histories.verify(state, self.name)
         return step.following
 
+    @aside()
+    def branch(self, which: IntArray, seed: int) -> Self:
+        """Returns copies of the environments `which [B′]`, each with a chance of its own.
+
+        They are deep copies where these have proved to be copies: another environment of this kind
+        is stepped as its copy was, and does the same. Elsewhere seed and actions are played again
+        in new environments, which must show the same. Then every generator of chance that a copy
+        holds is seeded anew: `np_random`, and those of NumPy and Python in attributes and in what
+        these hold. Where others decide, out of reach, `shared_chance` says so as far as that was
+        seen. The `state_dict` of copies cannot be asked for; close them where they hold something.
+
+        Raises:
+            NotCopyable: neither gives a copy.
+            TrdlabError: no episode has begun.
+        """
+        chosen, found = which.tolist(), []
+        with kept_luck():  # copying must not disturb the chance of what is copied
+            self._proof = self._proof or self._proved(chosen[0])
+            held = {env: generators(self._envs[env]) for env in set(chosen)}
+            if not self._proof.fault:
+                try:
+                    found = [copied(self._envs[env], held[env]) for env in chosen]
+                except NoDeepCopy as error:
+                    self._proof = replace(self._proof, fault=str(error))
+            if self._proof.fault:
+                again = zip(chosen, self._played_again(chosen, self._proof.fault), strict=True)
+                found = [(twin, own_chance(twin, held[env])) for env, twin in again]
+            words = np.random.SeedSequence(seed).spawn(len(chosen))
+            for (_, chance), own in zip(found, words, strict=True):
+                renew(chance, own)
+        copies = self._with([twin for twin, _ in found], seed)
+        copies.shared_chance = self._proof.shared_chance
+        return copies
+
+    @aside()
     def close(self) -> None:
         """Closes the environments."""
         for env in self._envs:
-            env.close()
+            self._source.close(env)
+
+    def _look_at(self, env: Any) -> None:
+        """Notes what can be seen and done in an environment."""
+        actions = discrete_actions(env.action_space, self.name)
+        self.num_actions, self.first_action = int(actions.n), int(actions.start)
+        self._called = [actions.start + i for i in range(self.num_actions)]  # np.int64, as drawn
+        self.action_names = action_names(env, self.num_actions, self.first_action)
+        self._space = env.observation_space
+        self.observation_space = frame_space(self._space, self.name)
+        self._channels_last = self.observation_space.shape != self._space.shape
+        grey = is_image(self._space) and len(self._space.shape or ()) == 2
+        self.stack = 1 if grey else None
+        spec, metadata = getattr(env, "spec", None), getattr(env, "metadata", None)
+        self.time_limit: int | None = spec.max_episode_steps if spec else None
+        self.frames_per_second: float | None = (metadata or {}).get("render_fps")
+
+    def _proved(self, env: int) -> Proof:
+        """Returns what others of this kind show about copies of an environment."""
+        seed, past = self._histories.past(env)
+        more = np.random.default_rng(0).integers(self.num_actions, size=LEAST + COMPARED)
+        actions = list(self.first_action + np.concatenate([past, more]))
+        try:
+            return prove(
+                lambda: self._source.make(1, beside=self._envs)[0],
+                Past(seed, actions[: len(past)]),
+                actions[len(past) :],
+            )
+        except InputError as error:
+            raise self._not_copyable(error.cause) from error
+        except Exception as error:  # noqa: BLE001  anything can be raised in another's code
+            return Proof(f"Its copies cannot be tried ({type(error).__name__}: {error}).")
+
+    def _played_again(self, which: list[int], fault: str) -> list[Env]:
+        """Returns new environments in which episodes of these have been played again.
+
+        Raises:
+            NotCopyable: they cannot be made, or show something else.
+        """
+        if self._is_copy:
+            raise self._not_copyable(f"{fault} Nor can a copy be played again.")
+        try:
+            envs = self._source.make(len(which), beside=self._envs)
+        except InputError as error:
+            raise self._not_copyable(f"{fault} {error.cause}") from error
+        copies = self._with(envs, seed=0)
+        step = copies._blank_step()
+        for twin, env in enumerate(which):
+            seed, actions = self._histories.past(env)
+            copies._histories.begin(twin)
+            copies._reset(twin, step.following, seed)
+            for action in actions.tolist():
+                copies._act(twin, action, step)
+            if not copies._histories.same(twin, self._histories, env):
+                copies.close()
+                raise self._not_copyable(f"{fault} Played again, it did something else.")
+        return envs
+
+    def _not_copyable(self, why: str) -> NotCopyable:
+        cure = "Judge it without copies of its states."
+        return NotCopyable(f"{self.name} cannot be copied: {why}", cure)
+
+    def _with(self, envs: list[Env], seed: int) -> Self:
+        """Returns the same with copies for environments, whose past is not known."""
+        other = copy(self)
+        other._envs, other.num_envs, other._is_copy = envs, len(envs), True
+        other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
+        return other
 
     def _begin(self, env: int, frames: Frames, seeding: int | None = None) -> None:
         """Begins an episode, its first frame into `frames [B, ...]`."""
-        observation, _ = self._envs[env].reset(seed=self._histories.begin(env, seeding))
-        frame = np.asarray(observation)
+        self._reset(env, frames, self._histories.begin(env, seeding))
+
+    def _reset(self, env: int, frames: Frames, seed: int) -> None:
+        frame = np.asarray(observation_of(self._envs[env], seed, self.name))
         if not np.can_cast(frame.dtype, frames.dtype, "same_kind"):
             raise InputError(
-                f"{self.env_id} gives observations of type {frame.dtype}, and its observation "
+                f"{self.name} gives observations of type {frame.dtype}, and its observation "
                 f"space is {self._space}.",
                 "One of the two is wrong.",
             )
-        frames[env] = self._frame(observation)
+        frames[env] = self._frame(frame)
         self._histories.record_reset(env, frames)
 
-    def _act(self, env: int, action: np.int64, step: Step) -> None:
+    def _act(self, env: int, action: int, step: Step) -> None:
         """Takes one environment's action, and fills its row of `step`."""
-        observation, reward, terminated, truncated, _ = self._envs[env].step(
-            action + self.first_action
+        observation, step.rewards[env], terminated, truncated = outcome_of(
+            self._envs[env], self._called[action], self.name
         )
         step.frames[env] = self._frame(observation)
-        step.rewards[env] = reward
         step.terminated[env] = terminated
         step.truncated[env] = truncated and not terminated
-        self._histories.record_step(env, int(action), step.frames, step.rewards)
+        self._histories.record_step(env, action, step.frames, step.rewards)
         if terminated or truncated:
             self._begin(env, step.following)
         else:
@@ -147,7 +272,7 @@ class GymEnvironments:
         frame = np.asarray(observation)
         if frame.shape != self._space.shape:
             raise InputError(
-                f"{self.env_id} gives observations of shape {frame.shape}, and its observation "
+                f"{self.name} gives observations of shape {frame.shape}, and its observation "
                 f"space is {self._space}.",
                 "One of the two is wrong.",
             )
@@ -155,68 +280,15 @@ class GymEnvironments:
 
     def _blank_frames(self) -> Frames:
         shape = self.observation_space.shape or ()
-        return np.empty((self.num_envs, *shape), dtype=self.observation_space.dtype)
+        return np.zeros((self.num_envs, *shape), dtype=self.observation_space.dtype)
 
     def _blank_step(self) -> Step:
         each = self.num_envs
         return Step(
             frames=self._blank_frames(),
-            rewards=np.empty(each),
-            terminated=np.empty(each, dtype=np.bool_),
-            truncated=np.empty(each, dtype=np.bool_),
+            rewards=np.zeros(each),
+            terminated=np.zeros(each, dtype=np.bool_),
+            truncated=np.zeros(each, dtype=np.bool_),
             life_lost=np.zeros(each, dtype=np.bool_),
             following=self._blank_frames(),
         )
-
-
-def frame_space(space: gym.Space[Any], name: str) -> gym.Space[Any]:
-    """Returns the space of single frames as networks read them: images channels first.
-
-    Raises:
-        InputError: no network reads such observations.
-
-    >>> frame_space(gym.spaces.Box(0, 255, (96, 64, 3), np.uint8), "CarRacing-v3")
-    Box(0, 255, (3, 96, 64), uint8)
-    """
-    if isinstance(space, gym.spaces.Discrete):
-        return space
-    if not isinstance(space, gym.spaces.Box):
-        raise InputError(
-            f"There is no network for the observation space of {name}: {space}.",
-            "Use a Box or Discrete one, for example through gymnasium.wrappers.FlattenObservation.",
-        )
-    if not (_is_image(space) and len(space.shape) == 3 and space.shape[-1] in _CHANNELS):
-        return space
-    low, high = (np.moveaxis(bound, -1, 0) for bound in (space.low, space.high))
-    return gym.spaces.Box(low, high, dtype=np.uint8)
-
-
-def _is_image(space: gym.Space[Any]) -> bool:
-    """Whether observations are pictures: bytes that use the whole range, in rows and columns."""
-    if not isinstance(space, gym.spaces.Box) or space.dtype != np.uint8:
-        return False
-    full = bool((space.low == 0).all() and (space.high == 255).all())
-    return full and len(space.shape) in (2, 3)
-
-
-def _checked_actions(env: gym.Env[Any, Any], name: str) -> gym.spaces.Discrete:
-    if str(env.spec.entry_point if env.spec else "").startswith("ale_py"):
-        raise InputError(
-            f"{name} is an Atari game.", f"Use: trdlab train atari {name.rpartition(':')[2]}"
-        )
-    if not isinstance(env.action_space, gym.spaces.Discrete):
-        raise InputError(
-            f"The action space of {name} is {env.action_space}.",
-            "A decomposition has one row per action: use an environment with a Discrete one.",
-        )
-    return env.action_space
-
-
-def _action_names(env: gym.Env[Any, Any], num_actions: int) -> tuple[str, ...]:
-    """Returns what the environment calls its actions, nothing where it does not tell."""
-    base: Any = env.unwrapped
-    names: npt.ArrayLike = getattr(base, "action_names", ())
-    if hasattr(base, "get_action_meanings"):
-        names = base.get_action_meanings()
-    told = tuple(str(name) for name in np.asarray(names).ravel())
-    return told if len(told) == num_actions else ()

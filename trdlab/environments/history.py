@@ -63,7 +63,12 @@ class Histories:
         return self._seed_of(env)
 
     def past(self, env: int) -> tuple[int, IntArray]:
-        """Returns the seed of an environment's last seeded reset, and its actions since."""
+        """Returns the seed of an environment's last seeded reset, and its actions since.
+
+        Raises:
+            TrdlabError: no episode has begun.
+        """
+        self._check_begun(env)
         return self._seed_of(env), np.array(self._actions[env], dtype=np.int64)
 
     def same(self, env: int, other: "Histories", other_env: int) -> bool:
@@ -90,8 +95,8 @@ class Histories:
         Raises:
             TrdlabError: no episode has begun.
         """
-        if self._seedings.min() < 0:
-            raise TrdlabError("The environments have not begun.", "Call reset() first.")
+        for env in range(len(self._actions)):
+            self._check_begun(env)
         actions = np.concatenate(self._actions)  # [Σ lengths]
         return {
             "settings": dict(self._settings),
@@ -138,6 +143,10 @@ class Histories:
                 f"again from the same seed (environment {env}).",
                 "Begin new episodes with reset().",
             )
+
+    def _check_begun(self, env: int) -> None:
+        if self._seedings[env] < 0:
+            raise TrdlabError("The environments have not begun.", "Call reset() first.")
 
     def _seed_of(self, env: int) -> int:
         words = np.random.SeedSequence([self._seed, env, int(self._seedings[env])])

@@ -1,31 +1,34 @@
 """Making a Gymnasium environment by its id, and saying in one line why it cannot be made."""
 
 import inspect
+import sys
 import warnings
 from collections.abc import Iterable, Mapping
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
 from trdlab.environments.arguments import say_arguments
-from trdlab.errors import InputError, TrdlabError, closest
+from trdlab.environments.aside import aside
+from trdlab.errors import InputError, NotImported, TrdlabError, closest
 
 # By its name, as Gymnasium finds entry points: what registers our maps stands above this layer.
 _REGISTERED_BY = {"trdlab": "trdlab.envs", "ALE": "ale_py"}
 _EXTRAS = {"box2d": "trdlab[box2d]"}
-_WRONG_VALUE = (TypeError, ValueError, LookupError, AssertionError, AttributeError)
 _LISTED = 'python -c "import gymnasium; gymnasium.pprint_registry()" lists those that there are.'
 
 
+@aside()
 def make_environment(
     env_id: str,
     arguments: Mapping[str, Any] | None = None,
     *,
     known: Iterable[str] | None = None,
 ) -> gym.Env[Any, Any]:
-    """Makes an environment by its Gymnasium id.
+    """Makes an environment by its Gymnasium id; what it prints goes to stderr.
 
     Args:
         env_id: such as `CartPole-v1`, or `module:id` to import a module first; trdlab's own maps,
@@ -56,7 +59,7 @@ def make_environment(
         raise InputError(
             f"{env_id} cannot be imported: {error}.", "Install what it needs, or check the id."
         ) from error
-    except (*_WRONG_VALUE, OSError, gym.error.Error) as error:
+    except Exception as error:  # whatever can be raised in another's code
         made = f" with {say_arguments(given)}" if given else ""
         reason = str(error).partition(" was raised from the environment creator")[0]
         raise InputError(
@@ -65,11 +68,48 @@ def make_environment(
         ) from error
 
 
+def import_named(module: str) -> None:
+    """Imports a module that the user has named, also from the present folder.
+
+    Raises:
+        ImportError: there is none, or it cannot be imported.
+    """
+    here = str(Path.cwd())
+    if here not in sys.path:  # as it is not for an installed command
+        sys.path.append(here)  # last: nothing in it hides what is installed
+    import_module(module)
+
+
+def check_imported(env_id: str) -> None:
+    """Refuses the environment of a run whose module has not been imported: it is code.
+
+    Args:
+        env_id: as the run's configuration has it; `MODULE:ENV_ID` needs a module.
+
+    Raises:
+        NotImported: it has not.
+
+    >>> check_imported("CartPole-v1")
+    >>> check_imported("mine:Maze-v0")
+    Traceback (most recent call last):
+    trdlab.errors.NotImported: The environment 'mine:Maze-v0' needs code that the run does not \
+hold: the module 'mine'. If you trust it, import mine first.
+    """
+    module = env_id.rpartition(":")[0]
+    if module and module not in sys.modules:
+        raise NotImported(
+            f"The environment '{env_id}' needs code that the run does not hold: the module "
+            f"'{module}'.",
+            module,
+        )
+
+
 def _find(env_id: str, known: Iterable[str] | None) -> Any:
     module, _, name = env_id.rpartition(":")
-    module = module or _REGISTERED_BY.get(name.partition("/")[0], "")
     if module:
-        import_module(module)
+        import_named(module)
+    elif ours := _REGISTERED_BY.get(name.partition("/")[0]):
+        import_module(ours)
     try:
         return gym.spec(name)
     except gym.error.Error as error:

@@ -24,6 +24,10 @@ class NotCopyable(InputError):  # noqa: N818  it says what an environment is, no
     """An environment of which no copies can be made."""
 
 
+class NotParallel(InputError):  # noqa: N818  it says what an environment is, not what failed
+    """An environment that cannot be made once more while there is another (see `in_batches`)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Step:
     """What one step of B environments led to.
@@ -60,7 +64,7 @@ class Environments(Protocol):
         observation_space: of one frame: a Box (images channels first) or a Discrete space.
         num_actions: A; the actions given to `step` run from 0 to A − 1.
         first_action: what the environment itself calls action 0.
-        action_names: A names, where the environment tells them, else empty.
+        action_names: A names; where the environment tells none, the numbers it gives them.
         stack: how many frames an observation holds; None where it is one frame without an axis
             for the stack.
         padding: what stands in a stack before the first frame (see `ReplayBuffer`).
@@ -84,8 +88,15 @@ class Environments(Protocol):
         """Begins an episode in every environment, and returns their first frames `[B, ...]`."""
         ...
 
-    def step(self, actions: IntArray) -> Step:
-        """Takes actions `[B]`; where an episode ends, the next one begins in the same call."""
+    def step(self, actions: IntArray, active: BoolArray | None = None) -> Step:
+        """Takes actions `[B]`; where an episode ends, the next one begins in the same call.
+
+        Args:
+            actions: `[B]`.
+            active: `[B]`, which environments act; by default all. The others cost nothing, or
+                little: they are paid 0, nothing ends, and their frames are of no moment. They must
+                stay inactive until `reset` or `load_state_dict`, and are not saved or copied.
+        """
         ...
 
     def state_dict(self) -> dict[str, Any]:
@@ -106,7 +117,14 @@ class Environments(Protocol):
 
 
 class CopyableEnvironments(Environments, Protocol):
-    """Environments of which copies can be made, in the middle of their episodes."""
+    """Environments that can be asked for copies, in the middle of their episodes.
+
+    Attributes:
+        shared_chance: of copies: whether it was seen that episodes know chance which is not the
+            copies' own, so that copies of one state do the same where the environment need not.
+    """
+
+    shared_chance: bool
 
     def branch(self, which: IntArray, seed: int) -> "CopyableEnvironments":
         """Returns copies that go on from where these are, each by a chance of its own.
@@ -116,6 +134,6 @@ class CopyableEnvironments(Environments, Protocol):
             seed: of the chance from here on.
 
         Raises:
-            NotCopyable: they cannot be copied after all.
+            NotCopyable: they cannot be copied; it says why.
         """
         ...

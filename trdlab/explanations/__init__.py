@@ -1,107 +1,101 @@
-"""Explanations: an Estimator's decompositions in, claims with their evidence and words out."""
+"""Explanations: an Estimator's decompositions in, claims with their numbers and words out."""
 
 from typing import TYPE_CHECKING
 
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
-    from trdlab.explanations.assessment import assess, moment_at
+    from trdlab.explanations.assessment import assess, moment_at, try_out
     from trdlab.explanations.calibration.calibration import Calibration, calibrate
     from trdlab.explanations.calibration.ceiling import Ceiling
-    from trdlab.explanations.calibration.findings import trust_findings
-    from trdlab.explanations.calibration.report import TrustReport, judge
-    from trdlab.explanations.calibration.sentences import check_trust, trust_sentences
+    from trdlab.explanations.calibration.report import CalibrationReport, judge
     from trdlab.explanations.calibration.trust import Trust
-    from trdlab.explanations.claims import Finding
-    from trdlab.explanations.comparison.compare import compare, find_pair
-    from trdlab.explanations.comparison.report import Comparison
-    from trdlab.explanations.episode.played import Played, play
+    from trdlab.explanations.comparison.comparing import compare
+    from trdlab.explanations.comparison.comparison import Comparison
+    from trdlab.explanations.episode.played import Played
     from trdlab.explanations.episode.revision import Revision, revise
     from trdlab.explanations.episode.story import Story, tell
-    from trdlab.explanations.explained import Explained, explain_agent
+    from trdlab.explanations.explanation import Explanation, explain
     from trdlab.explanations.moment.exact import gridworld_moment, tabular_moment
-    from trdlab.explanations.moment.explanation import Explanation, explain
-    from trdlab.explanations.moment.moment import Moment, Uncertainty, WhatIf, moment_of
+    from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty, WhatIf, moment_of
+    from trdlab.explanations.moment.outcome import Trial
     from trdlab.explanations.moment.sensitivity import find_flips
-    from trdlab.explanations.moment.sentences import check, sentence, sentences
-    from trdlab.explanations.slots import UnsupportedSentenceError
+    from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check
+    from trdlab.explanations.sections import Section
+    from trdlab.explanations.solved import SolvedState, solve_gridworld, solve_tabular
 
 __all__ = [
     "Calibration",
+    "CalibrationReport",
     "Ceiling",
+    "Choice",
+    "Claim",
     "Comparison",
-    "Explained",
     "Explanation",
-    "Finding",
     "Moment",
     "Played",
     "Revision",
+    "Section",
+    "SolvedState",
     "Story",
+    "Trial",
     "Trust",
-    "TrustReport",
     "Uncertainty",
     "UnsupportedSentenceError",
     "WhatIf",
     "assess",
     "calibrate",
     "check",
-    "check_trust",
     "compare",
     "explain",
-    "explain_agent",
     "find_flips",
-    "find_pair",
     "gridworld_moment",
     "judge",
     "moment_at",
     "moment_of",
-    "play",
     "revise",
-    "sentence",
-    "sentences",
+    "solve_gridworld",
+    "solve_tabular",
     "tabular_moment",
     "tell",
-    "trust_findings",
-    "trust_sentences",
+    "try_out",
 ]
 
 _HOMES = {
-    "Explanation": "moment.explanation",
-    "explain": "moment.explanation",
-    "Finding": "claims",
-    "find_flips": "moment.sensitivity",
+    "Choice": "moment.moment",
     "Moment": "moment.moment",
     "Uncertainty": "moment.moment",
     "WhatIf": "moment.moment",
     "moment_of": "moment.moment",
     "gridworld_moment": "moment.exact",
     "tabular_moment": "moment.exact",
-    "compare": "comparison.compare",
-    "find_pair": "comparison.compare",
-    "Comparison": "comparison.report",
+    "find_flips": "moment.sensitivity",
+    "Claim": "rules",
+    "UnsupportedSentenceError": "rules",
+    "check": "rules",
+    "Section": "sections",
+    "SolvedState": "solved",
+    "solve_gridworld": "solved",
+    "solve_tabular": "solved",
+    "compare": "comparison.comparing",
+    "Comparison": "comparison.comparison",
     "assess": "assessment",
     "moment_at": "assessment",
+    "try_out": "assessment",
+    "Explanation": "explanation",
+    "explain": "explanation",
     "Calibration": "calibration.calibration",
     "calibrate": "calibration.calibration",
     "Ceiling": "calibration.ceiling",
-    "Explained": "explained",
-    "explain_agent": "explained",
+    "CalibrationReport": "calibration.report",
+    "judge": "calibration.report",
+    "Trust": "calibration.trust",
+    "Trial": "moment.outcome",
     "Played": "episode.played",
-    "play": "episode.played",
     "Revision": "episode.revision",
     "revise": "episode.revision",
     "Story": "episode.story",
     "tell": "episode.story",
-    "trust_findings": "calibration.findings",
-    "TrustReport": "calibration.report",
-    "judge": "calibration.report",
-    "Trust": "calibration.trust",
-    "UnsupportedSentenceError": "slots",
-    "check": "moment.sentences",
-    "sentence": "moment.sentences",
-    "sentences": "moment.sentences",
-    "check_trust": "calibration.sentences",
-    "trust_sentences": "calibration.sentences",
 }
 
 __getattr__ = lazily(__name__, _HOMES)

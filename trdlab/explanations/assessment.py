@@ -1,27 +1,132 @@
 """Assessing an agent: its episodes are played, and what it expected is judged by what came."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, TypeGuard
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trdlab.agents.agent import Agent
-from trdlab.environments import CopyableEnvironments, Environments, NotCopyable
+from trdlab.arrays import FloatArray
+from trdlab.decomposition import RewardDecomposition
+from trdlab.environments import NotCopyable, NotParallel
 from trdlab.errors import InputError
-from trdlab.explanations.calibration.report import TrustReport, judge
+from trdlab.explanations.calibration.calibration import Calibration
+from trdlab.explanations.calibration.report import CalibrationReport, judge
+from trdlab.explanations.calibration.score import score_of
 from trdlab.explanations.moment.exact import exact_moment
-from trdlab.explanations.moment.moment import Moment, moment_of
+from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.outcome import Trial
-from trdlab.intervals import FEWEST_EPISODES
 from trdlab.rollouts.branches import Branches, Branching, Copying, TooFewMoments
-from trdlab.rollouts.counterfactual import counterfactual
+from trdlab.rollouts.counterfactual import compared, try_actions
 from trdlab.rollouts.episodes import Episode
-from trdlab.rollouts.playing import Watch, decide, play_to, unwatched
+from trdlab.rollouts.playing import Playing, Progress, Watch, can_be_copied, unwatched
+from trdlab.statistics import FEWEST_EPISODES
 from trdlab.tabular import ExactTable
 
 FOLLOWED = 100
 """Steps for which two actions that are tried are followed at least."""
+
+_FIRST = 0.2  # of the episodes, by which it is seen whether all are alike
+
+
+@dataclass(frozen=True)
+class _Judging:
+    """How episodes are played to judge an agent by.
+
+    Args:
+        agent: whom to judge.
+        max_steps: after which an episode is cut off, if not before.
+        seed: of everything.
+        watch: told how far the episodes are, after every step.
+    """
+
+    agent: Agent
+    max_steps: int | None
+    seed: int
+    watch: Watch
+
+    def alike(self, count: int) -> tuple[tuple[Episode, ...], bool]:
+        """Returns episodes by the policy alone, and whether they are too much alike to judge by.
+
+        Where all of the first ones are the same, no more are played, and each is given once.
+        """
+        first = min(count, max(FEWEST_EPISODES, round(_FIRST * count)))
+        played = self.played(0.0, first, of=count)
+        if count > first and len(_different(played)) > 1:
+            played += self.played(0.0, count - first, of=count, before=first)
+        different = _different(played)
+        alike = len(different) < min(FEWEST_EPISODES, count)
+        return (different if alike else played), alike
+
+    def played(
+        self, epsilon: float, count: int, *, of: int, before: int = 0
+    ) -> tuple[Episode, ...]:
+        """Returns `count` episodes out of some, `before` which others have been played."""
+
+        def tell(progress: Progress) -> None:
+            self.watch(replace(progress, finished=progress.finished + before, episodes=of))
+
+        return self.agent.play(
+            count,
+            seed=self.seed + 3 * (before > 0),  # the two seeds between are of the copies
+            epsilon=epsilon,
+            max_steps=self.max_steps,
+            watch=tell,
+            what="episodes with some random actions" if epsilon else "episodes to judge by",
+        )
+
+    def copied(self, copying: Copying, epsilon: float, every: int) -> "_Copied":
+        """Returns what else could have followed, and what follows foils, if there are any.
+
+        Where a few long episodes hide that most are short, moments are copied more often than
+        `every`.
+        """
+        agent = self.agent
+        branching = Branching(agent.estimator, agent.policy, copies=copying.copies)
+
+        def along(every: int, *, foils: bool) -> Branches:
+            environments = agent.make(copying.episodes, self.seed + 1 + foils)
+            try:
+                if not can_be_copied(environments):
+                    raise NotCopyable("Its environments cannot be copied.")
+                return branching.along(
+                    environments,
+                    every=every,
+                    epsilon=epsilon,
+                    max_steps=self.max_steps,
+                    seed=self.seed + 1 + foils,
+                    foils=foils,
+                    watch=self.watch,
+                )
+            except TooFewMoments:
+                if every == 1:
+                    raise
+                return along(every // 2, foils=foils)
+            finally:
+                environments.close()
+
+        try:
+            branches = along(every, foils=False)
+            foils = along(every, foils=True) if len(agent.action_names) > 1 else None
+        except (NotCopyable, NotParallel) as error:
+            return _Copied(lost=f"{error.cause} {LOST}")
+        return _Copied(branches, foils)
+
+
+LOST = (
+    "So nothing tells how well anybody could forecast here, nor how well the agent forecasts "
+    "actions that it would not take."
+)
+"""What is lost where the states of an environment cannot be copied."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Copied:
+    """What followed copies, or what is lost where there are none."""
+
+    branches: Branches | None = None
+    foils: Branches | None = None
+    lost: str = ""
 
 
 def assess(
@@ -33,20 +138,20 @@ def assess(
     copying: Copying | None = None,
     seed: int = 1000,
     watch: Watch = unwatched,
-) -> TrustReport:
+) -> CalibrationReport:
     """Plays episodes of an agent, and judges what it expected by what came.
 
     Where neither the agent nor its environments know chance, all episodes are the same one, of
-    which nothing can be told for sure. Then, unless ε is given, they are played again with an ε of
-    1/(N·w + 2), so that about one action in a horizon is a random one.
+    which nothing can be told for sure; it is not played again and again. Unless ε is given, others
+    are then played with an ε of 1/(N·w + 2), so that about one action in a horizon is a random one.
 
     Args:
         agent: whom to judge.
         episodes: how many to play.
         epsilon: the chance of a random action.
         max_steps: after which an episode is cut off, if not before.
-        copying: how states are copied for the ceiling and for foils; without it there are none, nor
-            where states cannot be copied.
+        copying: how states are copied for the ceiling and for foils; without it there are none. Nor
+            are there where states cannot be copied: `lost` of the report then says why.
         seed: of everything.
         watch: told how far the episodes are, after every step.
 
@@ -55,75 +160,38 @@ def assess(
     """
     if episodes < 1:
         raise InputError(f"There are {episodes} episodes.", "Ask for at least 1.")
-
-    def played_with(chance: float, what: str) -> tuple[Episode, ...]:
-        how: dict[str, Any] = {"epsilon": chance, "max_steps": max_steps, "seed": seed}
-        return agent.play(episodes, **how, watch=watch, what=what)
-
-    chance = epsilon or 0.0
-    played = played_with(chance, "episodes to judge by")
-    if epsilon is None and _different(played) < min(FEWEST_EPISODES, episodes):
-        chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
-        played = played_with(chance, "episodes with some random actions")
-    length = float(np.mean([len(episode) for episode in played]))
-    copied = None
+    judging, chance = _Judging(agent, max_steps, seed, watch), epsilon or 0.0
+    if chance:
+        played = judging.played(chance, episodes, of=episodes)
+        score = score_of(played, seed=seed)
+    else:
+        played, alike = judging.alike(episodes)
+        score = score_of(played, seed=seed)
+        if alike and epsilon is None:
+            chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
+            played = judging.played(chance, episodes, of=episodes)
+    copied = _Copied()
     if copying is not None:
-        every = max(1, round(length / copying.moments))
-        how: dict[str, Any] = {"epsilon": chance, "max_steps": max_steps, "watch": watch}
-        copied = _copied(agent, copying, every, seed + 1, **how)
-    return judge(
+        length = float(np.mean([len(episode) for episode in played]))
+        copied = judging.copied(copying, chance, max(1, round(length / copying.moments)))
+    report = judge(
         agent.estimator.future,
         played,
-        *(copied or ()),
+        copied.branches,
+        copied.foils,
+        score=score,
         seconds_per_step=agent.seconds_per_step,
         seed=seed,
     )
+    return replace(report, lost=copied.lost)
 
 
-def try_out(
-    agent: Agent, action: str, foil: str, *, seed: int = 0, step: int = 0, copies: int | None = None
-) -> Trial | None:
-    """Tries two actions at a step of an agent's episode, each from copies of the state.
+def usual_episodes(agent: Agent) -> int:
+    """Returns by how many episodes an agent is judged, where nothing else is said.
 
-    The copies are followed until all have ended, but no further than `FOLLOWED` steps or the
-    explicit components, whichever is more.
-
-    Args:
-        agent: whose policy is followed after the first action.
-        action: the name of one action.
-        foil: the name of the other.
-        seed: of the episode.
-        step: of that episode.
-        copies: how often each is tried, by default as the agent's `copying` says.
-
-    Returns:
-        What was forecast and what came; None where states cannot be copied.
-
-    Raises:
-        InputError: there is no such step or action, or both are the same.
+    Of what has to be played that is few; of an exact table it is cheap.
     """
-    environments = agent.make(1, seed)
-    steps = max(FOLLOWED, agent.estimator.time_axis.num_steps)
-    tries = agent.copying.tries if copies is None else copies
-    branching = Branching(agent.estimator, agent.policy, agent.counting, tries, steps)
-    try:
-        if not _can_be_copied(environments):
-            return None
-        stack = play_to(agent.estimator, environments, step, policy=agent.policy, seed=seed)
-        found = counterfactual(
-            branching,
-            environments,
-            stack,
-            agent.action_names.index(action),
-            agent.action_names.index(foil),
-            age=step,
-            seed=seed,
-        )
-    except NotCopyable:
-        return None
-    finally:
-        environments.close()
-    return Trial(found, agent.action_names, agent.seconds_per_step)
+    return 50 if agent.world is None else 300
 
 
 def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:
@@ -137,61 +205,114 @@ def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:
     Raises:
         InputError: the episode is over by then, or the step is negative.
     """
-    if step < 0:
-        raise InputError(f"The step is {step}.", "Steps are counted from 0.")
-    environments = agent.make(1, seed)
-    try:
-        stack = play_to(agent.estimator, environments, step, policy=agent.policy, seed=seed)
-    finally:
-        environments.close()
+    with agent.begin(seed=seed) as recording:
+        recording.play_to(step)
+        return moment_of_play(agent, recording.playing)
+
+
+def moment_of_play(agent: Agent, playing: Playing) -> Moment:
+    """Returns what the agent expects where the first of its episodes stands."""
     if agent.world is not None and isinstance(agent.estimator, ExactTable):
-        return exact_moment(agent.world, agent.estimator, int(stack.observations[0]))
-    chosen = decide(agent.estimator, stack.observations, agent.policy).probabilities[0]
-    moment = moment_of(agent.estimator, stack.observations[0], agent.action_names)
-    policy = np.asarray(chosen, dtype=np.float64)
-    return replace(moment, policy=policy, seconds_per_step=agent.seconds_per_step)
-
-
-def _different(episodes: Sequence[Episode]) -> int:
-    """Returns how many episodes are not the same as another one."""
-    return len(
-        {
-            (e.actions.tobytes(), e.rewards.tobytes(), np.asarray(e.expected).tobytes())
-            for e in episodes
-        }
+        return exact_moment(agent.world, agent.estimator, int(playing.stack.observations[0]))
+    decision = playing.decide()
+    # findings compare sums, and float32 sums differ in order
+    components = decision.decomposition.components[0].astype(np.float64)  # [A, N+1]
+    return Moment(
+        RewardDecomposition(components, agent.estimator.time_axis),
+        agent.action_names,
+        agent.estimator.future,
+        policy=decision.probabilities[0].astype(np.float64),
+        seconds_per_step=agent.seconds_per_step,
     )
 
 
-def _copied(
-    agent: Agent, copying: Copying, every: int, seed: int, **how: Any
-) -> tuple[Branches, Branches | None] | None:
-    """Returns what else could have followed, and what follows foils, if there is another action.
+def judged(moment: Moment, report: CalibrationReport) -> Moment:
+    """Returns a moment with what a report knows of such forecasts.
 
-    Where a few long episodes hide that most are short, moments are copied more often than `every`.
-    None where states cannot be copied.
+    That is how far they can be trusted, what they are off by, and whether rewards are of one kind.
+
+    Args:
+        moment: what is expected.
+        report: on the estimator that expects it.
     """
-    branching = Branching(agent.estimator, agent.policy, agent.counting, copies=copying.copies)
-
-    def along(every: int, seed: int, *, foils: bool) -> Branches | None:
-        environments = agent.make(copying.episodes, seed)
-        try:
-            if not _can_be_copied(environments):
-                return None
-            return branching.along(environments, every=every, seed=seed, foils=foils, **how)
-        except NotCopyable:
-            return None
-        except TooFewMoments:
-            if every == 1:
-                raise
-            return along(every // 2, seed, foils=foils)
-        finally:
-            environments.close()
-
-    branches = along(every, seed, foils=False)
-    if branches is None:
-        return None
-    return branches, along(every, seed + 1, foils=True) if len(agent.action_names) > 1 else None
+    reliability = report.calibration.reliability
+    return replace(
+        moment,
+        trust=report.trust,
+        foil_trust=report.foil_trust,
+        error=_root_mean_square(report.calibration),
+        foil_error=None if report.foils is None else _root_mean_square(report.foils),
+        only_reward=None if reliability is None else reliability.amount,
+    )
 
 
-def _can_be_copied(environments: Environments) -> TypeGuard[CopyableEnvironments]:
-    return hasattr(environments, "branch")
+def _root_mean_square(calibration: Calibration) -> FloatArray:
+    error = calibration.error
+    return np.where(np.isfinite(error.low), np.sqrt(error.value), np.nan)
+
+
+def try_out(
+    agent: Agent,
+    action: str,
+    foil: str,
+    *,
+    seed: int = 0,
+    step: int = 0,
+    copies: int | None = None,
+    report: CalibrationReport | None = None,
+) -> Trial:
+    """Tries two actions at a step of an agent's episode, each from copies of the state.
+
+    Args:
+        agent: whose policy is followed after the first action.
+        action: the name of one action.
+        foil: the name of the other.
+        seed: of the episode.
+        step: of that episode.
+        copies: how often each is tried, by default as the agent's `copying` says.
+        report: on the agent, which knows what rewards can come.
+
+    Raises:
+        InputError: there is no such step or action, or both are the same.
+        NotCopyable: the states of its environment cannot be copied.
+    """
+    with agent.begin(seed=seed) as recording:
+        recording.play_to(step)
+        playing = recording.playing
+        tried = try_in_play(agent, playing, action, foil, seed=seed, copies=copies)
+    return trial_of(agent, tried, report, seed=seed)
+
+
+def try_in_play(
+    agent: Agent, playing: Playing, action: str, foil: str, *, seed: int, copies: int | None = None
+) -> tuple[Branches, Branches]:
+    """Returns what follows two actions where the first of an agent's episodes stands.
+
+    The copies are followed until all have ended, but no further than `FOLLOWED` steps or the
+    explicit components, whichever is more.
+    """
+    steps = max(FOLLOWED, agent.estimator.time_axis.num_steps)
+    tries = agent.copying.tries if copies is None else copies
+    branching = Branching(agent.estimator, agent.policy, tries, steps)
+    numbers = (agent.action_names.index(name) for name in (action, foil))
+    return try_actions(branching, playing, *numbers, seed=seed)
+
+
+def trial_of(
+    agent: Agent,
+    tried: tuple[Branches, Branches],
+    report: CalibrationReport | None,
+    *,
+    seed: int,
+) -> Trial:
+    """Returns how two actions differ that an agent tried, held against what it knows otherwise."""
+    found = compared(tried, None if report is None else report.seen, seed=seed)
+    return Trial(found, agent.action_names, agent.seconds_per_step)
+
+
+def _different(episodes: Sequence[Episode]) -> tuple[Episode, ...]:
+    """Returns the episodes that are not the same as one before."""
+    found: dict[tuple[bytes, ...], Episode] = {}
+    for e in episodes:
+        found.setdefault((e.actions.tobytes(), e.rewards.tobytes(), e.expected.tobytes()), e)
+    return tuple(found.values())

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from trdlab.errors import TrdlabError
 from trdlab.explanations.claims import Claim, Shown
+from trdlab.explanations.rules import UnsupportedSentenceError
 from trdlab.formatting import amount, decimals_between, number, percent, plain, significant
 from trdlab.statistics import Estimate
 from trdlab.time_axis import TimeAxis, step_label
@@ -31,10 +31,6 @@ _COMPARED: dict[str, Callable[[Any], float]] = {
     "amount": float,
     "estimate": lambda estimate: float(estimate.value),
 }
-
-
-class UnsupportedSentenceError(TrdlabError):
-    """A rendered sentence makes a claim that the numbers do not support."""
 
 
 class Form(NamedTuple):

@@ -1,7 +1,8 @@
 """A gridworld as a Gymnasium environment: it samples from the exact model, which it carries."""
 
+from copy import copy, deepcopy
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Self, get_args
 
 import gymnasium as gym
 import numpy as np
@@ -160,6 +161,14 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
         from trdlab.gridworld.render import frame  # here: matplotlib is slow to import
 
         return frame(self.world, state, self.cell_pixels)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Returns an environment in the same state, with the same world: that never changes."""
+        twin = copy(self)
+        kept = (self.world, self._pictures)
+        memo |= {id(self): twin, **{id(shared): shared for shared in kept}}
+        twin.__dict__ |= deepcopy(self.__dict__, memo)
+        return twin
 
     def _observe(self, state: int) -> Observation:
         return np.int64(state) if self._pictures is None else self._pictures[state].copy()

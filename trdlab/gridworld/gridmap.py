@@ -164,7 +164,7 @@ def load_map(name_or_file: str | Path) -> GridMap:
         if not path.suffix and len(path.parts) == 1 and isinstance(error, FileNotFoundError):
             raise MapError(
                 f"There is no map '{text}'.",
-                f"{closest(text, map_names())} trdlab gridworld --list shows all.",
+                closest(text, map_names()),
             ) from error
         reason = getattr(error, "strerror", None) or error
         raise MapError(

@@ -37,6 +37,9 @@ _ICONS: dict[str, Callable[[], list[Shape]]] = {
 _TRACES = {"coin": icons.coin_taken, "treasure": icons.chest_taken}
 _UNSAID = {"coin": 1.0, "fountain": 1.0, "exit": 0.0}  # the values that go without saying
 
+ABOVE_ROUTES = 5.0
+"""The zorder of what stands on the ground of a map: coins, treasures, hazards, the drone."""
+
 
 class Paint(NamedTuple):
     """A filled outline on the map.
@@ -54,7 +57,8 @@ def draw_map(ax: Axes, world: Gridworld, state: int) -> Axes:
     """Draws a state of a gridworld: the map, what is left on it, and the drone.
 
     One cell is one unit; the centre of row r, column c lies at (c + ½, r + ½), and rows grow
-    downwards. A frame inside a cell says that entering it ends the episode.
+    downwards. A frame inside a cell says that entering it ends the episode. What is drawn with a
+    zorder between 1 and `ABOVE_ROUTES` lies on the ground, and hides nothing that stands on it.
 
     Args:
         ax: the axes to draw on; they lose their ticks and frame.
@@ -68,10 +72,13 @@ def draw_map(ax: Axes, world: Gridworld, state: int) -> Axes:
         InputError: there is no such state.
     """
     rows, columns = world.grid.shape
-    paths, colours = zip(*_scene(world, state), strict=True)
-    scene = PathCollection(paths, facecolors=colours, linewidths=0, antialiaseds=True)
-    scene.set_snap(False)  # else thin lines vanish where cells are small
-    ax.add_collection(scene, autolim=False)
+    for paints, zorder in zip(_scene(world, state), (1.0, ABOVE_ROUTES), strict=True):
+        paths, colours = zip(*paints, strict=True)
+        scene = PathCollection(
+            paths, facecolors=colours, linewidths=0, antialiaseds=True, zorder=zorder
+        )
+        scene.set_snap(False)  # else thin lines vanish where cells are small
+        ax.add_collection(scene, autolim=False)
     ax.set(xlim=(0, columns), ylim=(rows, 0), aspect="equal")
     ax.set_axis_off()
     return ax
@@ -105,22 +112,23 @@ def _state(world: Gridworld, state: int) -> State:
     return world.states[state]
 
 
-def _scene(world: Gridworld, state: int) -> list[Paint]:
-    """Returns everything there is to paint, from back to front."""
+def _scene(world: Gridworld, state: int) -> tuple[list[Paint], list[Paint]]:
+    """Returns the ground, and what stands on it, each from back to front."""
     grid, at = world.grid, _state(world, state)
     rows, columns = grid.shape
     places = list(product(range(rows), range(columns)))
-    scene = [Paint(Path(icons.box(0.0, 0.0, columns, rows)), icons.GRID)]
+    ground = [Paint(Path(icons.box(0.0, 0.0, columns, rows)), icons.GRID)]
+    things: list[Paint] = []
     walls = {place for place in places if grid.cell(*place).kind == "wall"}
     for shapes in (icons.wall(), icons.bricks()):  # first of all: they reach under their neighbours
-        scene += [paint for place in sorted(walls) for paint in _placed(shapes, place)]
+        ground += [paint for place in sorted(walls) for paint in _placed(shapes, place)]
     for place in (place for place in places if place not in walls):
-        scene += _ground(grid, place)
+        ground += _ground(grid, place)
         if place not in at.collected:
-            scene += _item(grid.cell(*place), place)
+            things += _item(grid.cell(*place), place)
         elif place != at.place:  # the drone hides the traces of what it has just taken
-            scene += _placed(_TRACES[grid.cell(*place).kind](), place)
-    return [*scene, *_placed(icons.drone(), at.place)]
+            things += _placed(_TRACES[grid.cell(*place).kind](), place)
+    return ground, [*things, *_placed(icons.drone(), at.place)]
 
 
 def _ground(grid: GridMap, place: Place) -> list[Paint]:

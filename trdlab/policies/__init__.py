@@ -1,1 +1,16 @@
-"""Policies: who acts."""
+"""Policies: who acts, with memory where there is some."""
+
+from trdlab.policies.protocol import Policy, ask, rows
+from trdlab.policies.ready import EpsilonGreedy, Greedy, Memoryless, Who, acting, greedy
+
+__all__ = [
+    "EpsilonGreedy",
+    "Greedy",
+    "Memoryless",
+    "Policy",
+    "Who",
+    "acting",
+    "ask",
+    "greedy",
+    "rows",
+]

@@ -7,21 +7,21 @@ from trdlab.lazy import lazily
 if TYPE_CHECKING:
     from trdlab.rollouts.branches import Branches, Branching, Copying
     from trdlab.rollouts.counterfactual import Counterfactual
-    from trdlab.rollouts.episodes import Counting, Episode, collect
+    from trdlab.rollouts.episodes import Episode, Recording, collect
     from trdlab.rollouts.evaluation import Evaluation, evaluate
-    from trdlab.rollouts.playing import play_to
+    from trdlab.rollouts.playing import Playing
 
 __all__ = [
     "Branches",
     "Branching",
     "Copying",
     "Counterfactual",
-    "Counting",
     "Episode",
     "Evaluation",
+    "Playing",
+    "Recording",
     "collect",
     "evaluate",
-    "play_to",
 ]
 
 _HOMES = {
@@ -29,10 +29,10 @@ _HOMES = {
     "Branching": "branches",
     "Copying": "branches",
     "Counterfactual": "counterfactual",
-    "Counting": "episodes",
     "Episode": "episodes",
+    "Playing": "playing",
+    "Recording": "episodes",
     "collect": "episodes",
-    "play_to": "playing",
     "Evaluation": "evaluation",
     "evaluate": "evaluation",
 }

@@ -8,11 +8,10 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import CopyableEnvironments
-from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.rollouts.episodes import AS_PAID, Counting
-from trdlab.rollouts.playing import Playing, Policy, Progress, Watch, decide, unwatched
+from trdlab.policies import Policy
+from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
 from trdlab.rollouts.realised import Samples, all_or_none
 
 
@@ -84,9 +83,9 @@ class Branching:
     """How moments are copied and continued.
 
     Args:
-        estimator: whose policy is followed, and whose predictions are kept.
-        policy: what the estimator describes, where that is not its own greedy policy.
-        counting: which rewards it counts, and what ends its future.
+        estimator: whose policy is followed, and whose predictions are kept; its `future` says
+            which rewards count, and what ends.
+        policy: who acts, where that is not the estimator's greedy policy.
         copies: n, how often each moment is continued.
         steps: how many steps a copy is followed; by default those of the explicit components.
             The residual is known only of moments whose copies have all ended by then.
@@ -97,7 +96,6 @@ class Branching:
 
     estimator: Estimator
     policy: Policy | None = None
-    counting: Counting = AS_PAID
     copies: int = 8
     steps: int | None = None
 
@@ -142,21 +140,23 @@ class Branching:
         """
         rng, count = np.random.default_rng(seed), environments.num_envs
         phase, found = rng.integers(every, size=count), []
-        playing = self._playing(environments, rng, max_steps=max_steps)
+        playing = Playing(
+            self.estimator,
+            environments,
+            rng,
+            policy=self.policy,
+            epsilon=epsilon,
+            max_steps=max_steps,
+        )
         what = "episodes with copies of first actions" if foils else "episodes with copies"
         while playing.running.any():
-            running, age = playing.running, playing.steps
-            decision, actions = playing.decide()
-            own = actions.copy()
-            random = running & (rng.random(count) < epsilon)
-            actions[random] = rng.integers(environments.num_actions, size=int(random.sum()))
-            due = running & (age % every == phase)
-            if due.any():
-                here = decision.decomposition.components[due[running]]  # [M′, A, N+1]
-                first = _others(own[due], environments.num_actions, rng) if foils else actions[due]
-                moments, stack = np.flatnonzero(due), playing.stack
-                found.append(self._continued(environments, stack, moments, first, age, here, rng))
-            playing.take(actions)
+            turn = playing.turn()
+            due = np.flatnonzero(playing.running & (playing.steps % every == phase))  # [M′]
+            if len(due):
+                own, actions = turn.own[due], turn.actions[due]
+                first = _others(own, environments.num_actions, rng) if foils else actions
+                found.append(self._continued(playing, due, first, playing.steps, rng))
+            playing.take(turn.actions)
             watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
         copied = sum(len(part.actions) for part in found)
         if copied < 2:
@@ -167,93 +167,79 @@ class Branching:
         return self._joined(found, count)
 
     def at(
-        self,
-        environments: CopyableEnvironments,
-        stack: FrameStack,
-        action: int,
-        *,
-        age: int = 0,
-        seed: int = 0,
+        self, playing: Playing, action: int, *, age: int | None = None, seed: int = 0
     ) -> Branches:
-        """Continues the present moment of the first environment n times, beginning with an action.
+        """Continues the first episode n times from where it stands, beginning with an action.
 
         Args:
-            environments: where the moment is; they are left as they are.
-            stack: what the agent sees there.
+            playing: where it stands; it is left as it is.
             action: the first one of every copy.
-            age: the steps since its episode began.
+            age: the steps since the episode began; by default those that were played.
             seed: of the copies.
+
+        Raises:
+            InputError: there is no such action.
+            NotCopyable: the environments cannot be copied.
         """
-        here = decide(self.estimator, stack.observations[:1], self.policy)
-        components, rng = here.decomposition.components, np.random.default_rng(seed)
-        if not 0 <= action < components.shape[1]:
+        num_actions = playing.environments.num_actions
+        if not 0 <= action < num_actions:
             raise InputError(
-                f"There is no action {action}.", f"They run from 0 to {components.shape[1] - 1}."
+                f"There is no action {action}.", f"They run from 0 to {num_actions - 1}."
             )
-        first, moment = np.array([action]), np.array([0])
-        found = self._continued(environments, stack, moment, first, age, components, rng)
+        rng, age = np.random.default_rng(seed), playing.steps if age is None else age
+        found = self._continued(playing, np.array([0]), np.array([action]), age, rng)
         return self._joined([found], 1)
 
     def _continued(
         self,
-        environments: CopyableEnvironments,
-        stack: FrameStack,
+        playing: Playing,
         moments: IntArray,
         first: IntArray,
         age: int,
-        components: FloatArray,
         rng: np.random.Generator,
     ) -> Branches:
-        """Continues the `moments [M]` with the actions `first [M]`; `components [M, A, N+1]`."""
+        """Continues the `moments [M]` with the actions `first [M]`."""
         axis, copies = self.estimator.time_axis, self.copies
-        which = np.repeat(moments, copies)  # [M·n]
-        branch = environments.branch(which, int(rng.integers(2**31)))
-        seen = FrameStack(stack.newest[which], stack.size, stack.padding)
-        seen.frames[:] = stack.frames[which]
-        rewards, ended = self._followed(branch, seen, np.repeat(first, copies), rng)
-        branch_observed, known = _on_axis(axis, rewards, ended, environments.time_limit, age)
+        here = np.searchsorted(np.flatnonzero(playing.running), moments)  # [M], of those asked
+        predicted = playing.decide().decomposition.components[here, first]  # [M, N+1]
+        which, length = np.repeat(moments, copies), self.steps or axis.num_steps  # [M·n]
+        branch = playing.branch(which, seed=int(rng.integers(2**31)), rng=rng, max_steps=length)
+        rewards, ended = self._followed(branch, np.repeat(first, copies), length)
+        observed, known = _on_axis(axis, rewards, ended, self._time_limit(playing), age)
         shape = (len(moments), copies, axis.num_components)
         return Branches(
             time_axis=axis,
             actions=first,
-            predicted=components[np.arange(len(first)), first].astype(np.float64),
-            observed=branch_observed.reshape(shape),
+            predicted=predicted.astype(np.float64),
+            observed=observed.reshape(shape),
             known=np.asarray(known.reshape(shape).all(axis=1)),
             episode=moments,
-            num_episodes=environments.num_envs,
+            num_episodes=playing.environments.num_envs,
         )
 
+    def _time_limit(self, playing: Playing) -> int | None:
+        """Returns the steps beyond which nothing can be known."""
+        own = playing.environments.time_limit
+        return None if self.estimator.future.time_limit_ends else own
+
     def _followed(
-        self,
-        branch: CopyableEnvironments,
-        stack: FrameStack,
-        actions: IntArray,
-        rng: np.random.Generator,
+        self, branch: Playing, actions: IntArray, length: int
     ) -> tuple[FloatArray, IntArray]:
         """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, the ends.
 
         An end is the number of steps until nothing is left to come; −1 where none was seen.
         """
-        count = branch.num_envs
-        length = self.steps or self.estimator.time_axis.num_steps
+        count, future = len(actions), self.estimator.future
         rewards, ended = np.zeros((count, length)), np.full(count, -1)
-        playing = self._playing(branch, rng, max_steps=length, stack=stack)
-        while playing.running.any():
-            running, t = playing.running, playing.steps
-            if t > 0:
-                _, actions = playing.decide()
-            step = playing.take(actions)
-            rewards[running, t] = self.counting.count(step.rewards)[running]
-            end = running & self.counting.ends(step)
+        while branch.running.any():
+            running, t = branch.running, branch.steps
+            step = branch.take(branch.turn().actions if t else actions)
+            rewards[running, t] = future.count(step.rewards)[running]
+            end = running & future.ends(step.terminated, step.truncated, step.life_lost)
             ended[end] = t + 1
             rewards[running & step.truncated & ~end, t + 1 :] = np.nan
-            playing.running &= ~end
+            branch.stop(end)
         return rewards, ended
-
-    def _playing(
-        self, environments: CopyableEnvironments, rng: np.random.Generator, **how: Any
-    ) -> Playing:
-        return Playing(self.estimator, environments, rng, policy=self.policy, **how)
 
     def _joined(self, found: list[Branches], num_episodes: int) -> Branches:
         """Returns the moments of all times, in the order of their episodes."""

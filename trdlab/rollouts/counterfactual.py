@@ -6,11 +6,24 @@ import numpy as np
 
 from trdlab.arrays import RELATIVE_ZERO, FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.environments import CopyableEnvironments
-from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
-from trdlab.intervals import LEVEL, RESAMPLES, Estimates, draws, percentiles
 from trdlab.rollouts.branches import Branches, Branching
+from trdlab.rollouts.playing import Playing
+from trdlab.statistics import Estimates, mean_difference
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What is known from elsewhere of the rewards that can come.
+
+    Args:
+        range: `[2, N+2]`, the least and the most that ever came of every component, and of all
+            together.
+        chance: whether copies of a state ever went differently; None where none were made.
+    """
+
+    range: FloatArray
+    chance: bool | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +39,8 @@ class Counterfactual:
             it is that of the explicit components.
         predicted: `[N+2]`, action − foil of every component, and of their sum.
         observed: `[N+2]`, the same of the means of what followed; NaN where that is not known.
-            There is no interval where nothing varied, unless nothing did at any step: what happened
-            in none of some copies can still happen.
+            Intervals mind what is too rare to be seen; they have no width where there is no chance.
+        same_every_time: whether all copies of each action brought the same, as far as is known.
     """
 
     time_axis: TimeAxis
@@ -37,66 +50,81 @@ class Counterfactual:
     whole: bool
     predicted: FloatArray
     observed: Estimates
-
-    @property
-    def same_every_time(self) -> bool:
-        """Whether all copies of each action went the same way, at every step that is known."""
-        known = ~np.isnan(self.observed.value)
-        return bool((self.observed.low == self.observed.high)[known].all())
+    same_every_time: bool
 
 
-def counterfactual(
+def try_actions(
     branching: Branching,
-    environments: CopyableEnvironments,
-    stack: FrameStack,
+    playing: Playing,
     action: int,
     foil: int,
     *,
-    age: int = 0,
+    age: int | None = None,
     seed: int = 0,
-    level: float = LEVEL,
-    resamples: int = RESAMPLES,
-) -> Counterfactual:
+) -> tuple[Branches, Branches]:
     """Tries two actions, each from copies of the same state, and follows the policy after them.
 
     Args:
         branching: the estimator, and how many copies to make.
-        environments: where the state is: that of the first of them.
-        stack: what the agent sees there.
+        playing: where the state is: that of the first episode.
         action: the number of one action.
         foil: the number of the other.
-        age: the steps since the episode began.
-        seed: of the copies and of the bootstrap.
-        level: the probability that the intervals are made for.
-        resamples: how many samples of copies are drawn.
+        age: the steps since the episode began; by default those that were played.
+        seed: of the copies.
+
+    Returns:
+        What followed the one and the other.
 
     Raises:
         InputError: there is no such action, or both are the same.
+        NotCopyable: the environments cannot be copied.
     """
     if action == foil:
         raise InputError(f"Action and foil are both {action}.", "Give two different actions.")
-    seeds = np.random.SeedSequence(seed).generate_state(2).tolist()
-    tried = [
-        branching.at(environments, stack, first, age=age, seed=own)
-        for first, own in zip((action, foil), seeds, strict=True)
-    ]
-    rng = np.random.default_rng(seed)
+    one, other = np.random.SeedSequence(seed).generate_state(2).tolist()
+    return (
+        branching.at(playing, action, age=age, seed=one),
+        branching.at(playing, foil, age=age, seed=other),
+    )
+
+
+def compared(
+    tried: tuple[Branches, Branches], seen: Seen | None = None, *, seed: int = 0
+) -> Counterfactual:
+    """Returns how two actions differ that were tried.
+
+    Nothing can come that is less, or more, than what was ever seen or is predicted. Where all
+    copies of each brought the same, and not always nothing, there is no chance, unless copies went
+    differently elsewhere.
+
+    Args:
+        tried: what followed the one and the other.
+        seen: what is known from elsewhere of the rewards that can come.
+        seed: of the intervals.
+    """
     whole = all(bool(branches.known[0, -1]) for branches in tried)
-    futures = [_futures(branches, whole) for branches in tried]  # 2 of [n, N+2]
-    one, other = (draws(len(of), resamples, rng) @ of / len(of) for of in futures)
-    varies = np.max([np.ptp(of, axis=0) > 0.0 for of in futures], axis=0)  # [N+2]
-    found = percentiles(one - other, level, branching.copies > 1)
-    ends = (np.where(varies, end, found.value) for end in (found.low, found.high))
-    said = [branches.predicted[0] for branches in tried]  # 2 of [N+1]
-    whole_of = [row.sum() if whole else row[:-1].sum() for row in said]
+    one, other = (_futures(branches, whole) for branches in tried)  # [n, N+2]
+    said = np.stack([_with_sum(branches.predicted[0], whole) for branches in tried])  # [2, N+2]
+    everything = np.concatenate([one, other, said, *([] if seen is None else [seen.range])])
+    same = not any(np.nan_to_num(np.ptp(of, axis=0)).any() for of in (one, other))
+    chance = None if seen is None else seen.chance
+    if same and (chance is False or (chance is None and np.nan_to_num(one + other).any())):
+        value = one.mean(axis=0) - other.mean(axis=0)
+        observed = Estimates(value, value, value)
+    else:
+        rng = np.random.default_rng(seed)
+        observed = mean_difference(
+            one, other, everything.min(axis=0), everything.max(axis=0), rng=rng
+        )
     return Counterfactual(
-        time_axis=branching.estimator.time_axis,
-        action=action,
-        foil=foil,
-        copies=branching.copies,
+        time_axis=tried[0].time_axis,
+        action=int(tried[0].actions[0]),
+        foil=int(tried[1].actions[0]),
+        copies=tried[0].copies,
         whole=whole,
-        predicted=_apart(*(np.append(*of) for of in zip(said, whole_of, strict=True))),
-        observed=Estimates(found.value, *ends).where(np.True_, varies | ~varies.any()),
+        predicted=_apart(*said),
+        observed=observed,
+        same_every_time=same,
     )
 
 
@@ -111,4 +139,10 @@ def _futures(branches: Branches, whole: bool) -> FloatArray:
     observed = np.where(branches.known[0], branches.observed[0], np.nan)  # [n, N+1]
     if not whole and branches.time_axis.horizon == 0:
         return np.column_stack([observed, observed])  # the sum of nothing that was seen is no 0
-    return np.column_stack([observed, (observed if whole else observed[:, :-1]).sum(axis=1)])
+    return _with_sum(observed, whole)
+
+
+def _with_sum(components: FloatArray, whole: bool) -> FloatArray:
+    """Returns `[..., N+2]`: components with their sum, or that of the explicit ones."""
+    counted = components if whole else components[..., :-1]
+    return np.concatenate([components, counted.sum(axis=-1, keepdims=True)], axis=-1)

@@ -7,36 +7,11 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.environments import Environments, Step
+from trdlab.environments import Environments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.rollouts.playing import Playing, Policy, Progress, Watch, unwatched
-
-
-@dataclass(frozen=True)
-class Counting:
-    """Which rewards an estimator counts, and what ends its future; its `Future` says so in words.
-
-    Args:
-        clip_rewards: whether it counts the sign of each reward.
-        life_loss_ends: whether its future ends where a life is lost.
-    """
-
-    clip_rewards: bool = False
-    life_loss_ends: bool = False
-
-    def count(self, rewards: FloatArray) -> FloatArray:
-        """Returns rewards as they are counted."""
-        return np.sign(rewards) if self.clip_rewards else rewards
-
-    def ends(self, step: Step) -> BoolArray:
-        """Returns `[B]`: where nothing is left to come after a step."""
-        lost = step.life_lost & self.life_loss_ends
-        return np.asarray(step.terminated | lost)
-
-
-AS_PAID = Counting()
-"""Rewards as the environment pays them, until the episode terminates."""
+from trdlab.policies import Policy
+from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +25,7 @@ class Episode:
         actions: `[T]`.
         rewards: `[T]`, as the estimator counts them.
         life_lost: `[T]`, whether a life was lost and the episode went on.
-        ends: `[T]`, whether nothing is left to come after a step: the episode terminated, or a
-            life was lost and that counts as an end.
+        ends: `[T]`, whether nothing is left to come after a step, as the estimator's future says.
         terminated: whether the episode ended for good; otherwise it was truncated.
         random: `[T + N·w]`, whether the action was a random one instead of the policy's. It goes
             on past the end as if there were more steps, so that what is left out because of it
@@ -85,33 +59,137 @@ class Episode:
         return np.asarray(self.decomposition.components[np.arange(len(self)), self.actions])
 
 
-def collect(
-    estimator: Estimator,
-    environments: Environments,
-    *,
-    policy: Policy | None = None,
-    counting: Counting = AS_PAID,
-    epsilon: float = 0.0,
-    max_steps: int | None = None,
-    seed: int = 0,
-    watch: Watch = unwatched,
-    what: str = "episodes",
-) -> tuple[Episode, ...]:
-    """Plays one episode in each environment, by the policy that the estimator describes.
+class Recording:
+    """Episodes that are written down as they are played, and can be paused at any step.
 
     Args:
-        estimator: whose predictions are kept.
+        estimator: whose predictions are kept; its `future` says which rewards count, and what ends.
         environments: E of them; they are reset.
-        policy: what the estimator describes, where that is not its own greedy policy.
-        counting: which rewards it counts, and what ends its future.
+        policy: who acts, where that is not the estimator's greedy policy.
         epsilon: the chance of a random action instead. Random actions lead to more states; what
             follows one is not held against what was predicted before it.
         max_steps: after which an episode is truncated, if the environment has not ended it before;
             it is a `time_limit` like that of an environment.
-        seed: of the actions; those of the policy are drawn as `play_to` draws them, so that with
-            ε = 0 a lone episode is the same there.
+        seed: of the actions.
+
+    Attributes:
+        playing: where the episodes stand.
+
+    Raises:
+        InputError: ε is outside [0, 1), or there is not a single step.
+    """
+
+    def __init__(
+        self,
+        estimator: Estimator,
+        environments: Environments,
+        *,
+        policy: Policy | None = None,
+        epsilon: float = 0.0,
+        max_steps: int | None = None,
+        seed: int = 0,
+    ) -> None:
+        if not 0.0 <= epsilon < 1.0:
+            raise InputError(f"ε is {epsilon}.", "It must be at least 0 and less than 1.")
+        if max_steps is not None and max_steps < 1:
+            raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
+        self._estimator, self._epsilon = estimator, epsilon
+        self._chance = np.random.default_rng([seed, 1])
+        self.playing = Playing(
+            estimator,
+            environments,
+            np.random.default_rng(seed),
+            policy=policy,
+            epsilon=epsilon,
+            chance=self._chance,
+            max_steps=max_steps,
+        )
+        count = environments.num_envs
+        self._logs: list[list[tuple[Any, ...]]] = [[] for _ in range(count)]
+        self._last, self._terminated = [np.zeros(0)] * count, np.zeros(count, dtype=np.bool_)
+
+    def play(
+        self, until: int | None = None, *, watch: Watch = unwatched, what: str = "episodes"
+    ) -> None:
+        """Plays on to the ends of all episodes, or until so many steps have been taken.
+
+        Args:
+            until: the steps; by default there is no such limit.
+            watch: told how far the episodes are, after every step.
+            what: they are called then.
+        """
+        playing, count = self.playing, len(self._logs)
+        while playing.running.any() and playing.steps != until:
+            self._take()
+            watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
+
+    def play_to(self, step: int) -> None:
+        """Plays the first episode to a step, at which it is paused.
+
+        Raises:
+            InputError: the episode is over by then, or the step is negative.
+        """
+        if step < 0:
+            raise InputError(f"The step is {step}.", "Steps are counted from 0.")
+        self.play(step)
+        if not self.playing.running[0]:
+            steps = len(self._logs[0])
+            raise InputError(
+                f"There is no step {step}: the episode is over after {steps} steps.",
+                f"Choose a step from 0 to {steps - 1}.",
+            )
+
+    def _take(self) -> None:
+        playing, future = self.playing, self._estimator.future
+        running, decision, turn = playing.running, playing.decide(), playing.turn()
+        step = playing.take(turn.actions)
+        ends = future.ends(step.terminated, step.truncated, step.life_lost)
+        happened = (turn.actions, future.count(step.rewards), step.life_lost, ends, turn.random)
+        seen = zip(decision.decomposition.components, decision.expected, strict=True)
+        for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
+            self._logs[env].append((*expectations, *(part[env] for part in happened)))
+        if playing.finished.any():
+            final = playing.at_last().expected
+            for env, expected in zip(np.flatnonzero(playing.finished), final, strict=True):
+                self._last[env] = expected
+            self._terminated |= playing.finished & step.terminated
+
+    def episodes(self) -> tuple[Episode, ...]:
+        """Returns the E episodes, once all of them are over, in the order of the environments."""
+        axis, future = self._estimator.time_axis, self._estimator.future
+        own = None if future.time_limit_ends else self.playing.environments.time_limit
+        limits = [limit for limit in (own, self.playing.max_steps) if limit is not None]
+        coins = self._chance.random((len(self._logs), axis.num_steps)) < self._epsilon  # [E, N·w]
+        return tuple(
+            _episode(
+                log,
+                self._last[env],
+                coins[env],
+                time_axis=axis,
+                terminated=bool(self._terminated[env]),
+                epsilon=self._epsilon,
+                time_limit=min(limits, default=None),
+            )
+            for env, log in enumerate(self._logs)
+        )
+
+
+def collect(
+    estimator: Estimator,
+    environments: Environments,
+    *,
+    watch: Watch = unwatched,
+    what: str = "episodes",
+    **how: Any,
+) -> tuple[Episode, ...]:
+    """Plays one episode in each environment to its end, by the policy that the estimator describes.
+
+    Args:
+        estimator: whose predictions are kept.
+        environments: E of them; they are reset.
         watch: told how far the episodes are, after every step.
         what: they are called then.
+        how: as for `Recording`.
 
     Returns:
         E episodes, in the order of the environments.
@@ -119,45 +197,9 @@ def collect(
     Raises:
         InputError: ε is outside [0, 1), or there is not a single step.
     """
-    if not 0.0 <= epsilon < 1.0:
-        raise InputError(f"ε is {epsilon}.", "It must be at least 0 and less than 1.")
-    if max_steps is not None and max_steps < 1:
-        raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
-    rng, chance = np.random.default_rng(seed), np.random.default_rng([seed, 1])
-    count = environments.num_envs
-    logs: list[list[tuple[Any, ...]]] = [[] for _ in range(count)]
-    last, terminated = [np.zeros(0)] * count, np.zeros(count, dtype=np.bool_)
-    playing = Playing(estimator, environments, rng, policy=policy, max_steps=max_steps)
-    while playing.running.any():
-        running = playing.running
-        decision, actions = playing.decide()
-        random = running & (chance.random(count) < epsilon)
-        actions[random] = chance.integers(environments.num_actions, size=int(random.sum()))
-        step = playing.take(actions)
-        happened = (actions, counting.count(step.rewards), step.life_lost, counting.ends(step))
-        seen = zip(decision.decomposition.components, decision.expected, strict=True)
-        for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
-            logs[env].append((*expectations, *(part[env] for part in happened), random[env]))
-        if playing.finished.any():
-            final = playing.at_last().expected
-            for env, expected in zip(np.flatnonzero(playing.finished), final, strict=True):
-                last[env] = expected
-            terminated |= playing.finished & step.terminated
-        watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
-    coins = chance.random((count, estimator.time_axis.num_steps)) < epsilon  # [E, N·w]
-    limits = [x for x in (environments.time_limit, max_steps) if x is not None]
-    return tuple(
-        _episode(
-            log,
-            last[env],
-            coins[env],
-            time_axis=estimator.time_axis,
-            terminated=bool(terminated[env]),
-            epsilon=epsilon,
-            time_limit=min(limits, default=None),
-        )
-        for env, log in enumerate(logs)
-    )
+    recording = Recording(estimator, environments, **how)
+    recording.play(watch=watch, what=what)
+    return recording.episodes()
 
 
 def _episode(

@@ -1,15 +1,17 @@
 """How well an agent plays: whole episodes, and the returns that the environment pays."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.environments import Environments
-from trdlab.environments.stack import FrameStack
+from trdlab.errors import InputError
 from trdlab.estimator import Estimator
+from trdlab.policies import Policy, acting
+from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
 from trdlab.statistics import Estimate, bootstrap, interquartile_mean
 
 
@@ -23,6 +25,8 @@ class Evaluation:
         truncated: `[E]`, whether an episode was cut off rather than ended.
         epsilon: the chance of a random action.
         seed: of the environments and of the random actions.
+        max_steps: after which an episode was cut off, if not before; None for the environment's own
+            limit alone.
     """
 
     returns: FloatArray
@@ -30,6 +34,7 @@ class Evaluation:
     truncated: BoolArray
     epsilon: float
     seed: int
+    max_steps: int | None = None
 
     @property
     def mean(self) -> Estimate:
@@ -45,10 +50,11 @@ class Evaluation:
         """Returns plain data, for JSON."""
         means = {"mean": self.mean, "interquartile_mean": self.interquartile_mean}
         return {
-            "schema": "trdlab.rollouts.evaluation/1",
+            "schema": "trdlab.evaluation/1",
             "episodes": len(self.returns),
             "epsilon": self.epsilon,
             "seed": self.seed,
+            "max_steps": self.max_steps,
             **{
                 name: {"value": of.value, "low": of.low, "high": of.high, "level": 0.95}
                 for name, of in means.items()
@@ -60,40 +66,57 @@ class Evaluation:
 
 
 def evaluate(
-    estimator: Estimator,
+    who: Policy | Estimator,
     environments: Environments,
     *,
     epsilon: float = 0.0,
+    max_steps: int | None = None,
     seed: int = 0,
-    on_episode: Callable[[int], None] = lambda finished: None,
+    watch: Watch = unwatched,
 ) -> Evaluation:
-    """Plays one episode in each environment, taking the action of largest Σ components.
+    """Plays one episode in each environment, and keeps the rewards that the environment pays.
 
     Args:
-        estimator: whose greedy policy it is.
+        who: plays; an estimator by its greedy policy.
         environments: E of them, made with `seed`; they are reset.
         epsilon: the chance of a random action instead.
-        seed: of the random actions, and to be told with the result.
-        on_episode: called with the number of finished episodes whenever some finish.
+        max_steps: after which an episode is cut off, if the environment has not ended it before.
+        seed: of the actions, and to be told with the result.
+        watch: told how far the episodes are, after every step.
+
+    Raises:
+        InputError: `who` is neither policy nor estimator, or there is not a single step.
     """
-    rng, count = np.random.default_rng(seed), environments.num_envs
-    stack = FrameStack(environments.reset(), environments.stack, environments.padding)
+    if max_steps is not None and max_steps < 1:
+        raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
+    count = environments.num_envs
+    playing = Playing(
+        None,
+        environments,
+        np.random.default_rng(seed),
+        policy=acting(who),
+        epsilon=epsilon,
+        chance=np.random.default_rng([seed, 1]),
+        max_steps=max_steps,
+    )
     returns, lengths = np.zeros(count), np.zeros(count, dtype=np.int64)
-    running, truncated = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-    while running.any():
-        explore = rng.random(count) < epsilon  # [E]
-        actions = rng.integers(environments.num_actions, size=count)  # [E]
-        chosen = running & ~explore
-        if chosen.any():  # those that have finished need no forward pass
-            values = estimator.decompose(stack.observations[chosen]).value  # [≤ E, A]
-            actions[chosen] = values.argmax(axis=1)
-        step = environments.step(actions)
-        stack.push(step.following, step.ended)
+    truncated = np.zeros(count, dtype=np.bool_)
+    while playing.running.any():
+        running = playing.running
+        step = playing.take(playing.turn().actions)
         returns[running] += step.rewards[running]
         lengths[running] += 1
-        truncated |= running & step.truncated
-        finishes = running & step.ended
-        running &= ~step.ended
-        if finishes.any():
-            on_episode(int(count - running.sum()))
-    return Evaluation(returns, lengths, truncated, epsilon, seed)
+        truncated |= playing.finished & ~step.terminated
+        finished = int(count - playing.running.sum())
+        watch(Progress("episodes to score", finished, count, playing.steps))
+    return Evaluation(returns, lengths, truncated, epsilon, seed, max_steps)
+
+
+def joined(parts: Sequence[Evaluation]) -> Evaluation:
+    """Returns evaluations of one agent, made alike but of other episodes, as a single one."""
+    return replace(
+        parts[0],
+        returns=np.concatenate([part.returns for part in parts]),
+        lengths=np.concatenate([part.lengths for part in parts]),
+        truncated=np.concatenate([part.truncated for part in parts]),
+    )

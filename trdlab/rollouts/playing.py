@@ -2,19 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.environments import Environments, Step
+from trdlab.environments import CopyableEnvironments, Environments, NotCopyable, Step
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-
-Policy = Callable[[Any], FloatArray]
-"""From observations `[B, ...]` to action probabilities `[B, A]`."""
+from trdlab.policies import Policy, ask, greedy, rows
 
 LONGEST = 1_000
 """Steps after which an episode is no longer played, where nothing else is said."""
@@ -72,44 +70,45 @@ class Decision:
         weights = self.probabilities[:, None]  # [B, 1, A]
         return np.asarray((weights @ self.decomposition.components)[:, 0])
 
-    def draw(self, rng: np.random.Generator) -> IntArray:
-        """Returns `[B]`: an action of the policy each."""
-        cumulative = self.probabilities.cumsum(axis=1)
-        level = rng.random(len(cumulative)) * cumulative[:, -1]  # the last may not be quite 1
-        return np.asarray((cumulative <= level[:, None]).sum(axis=1))
 
-
-def decide(estimator: Estimator, observations: Any, policy: Policy | None = None) -> Decision:
-    """Returns what an estimator expects, and what the policy it describes does.
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """What B episodes do at a step; where one has ended, 0 and nothing random.
 
     Args:
-        estimator: whatever decomposes.
-        observations: `[B, ...]`.
-        policy: the given policy that the estimator describes; without one, the action of largest
-            Σ components, of equals the first.
+        probabilities: `[R, A]`, how likely the policy takes each action where episodes go on.
+        own: `[B]`, the actions drawn from the policy.
+        random: `[B]`, whether a random action is taken in place of it.
+        actions: `[B]`, what is taken.
     """
-    decomposition = estimator.decompose(observations)  # [B, A, N+1]
-    if policy is not None:
-        return Decision(decomposition, policy(observations))
-    value = decomposition.value  # [B, A]
-    greedy = value.argmax(axis=1)[:, None] == np.arange(value.shape[1])
-    return Decision(decomposition, greedy.astype(value.dtype))
+
+    probabilities: FloatArray
+    own: IntArray
+    random: BoolArray
+    actions: IntArray
 
 
 class Playing:
-    """B episodes that a policy plays side by side, one each; who plays asks, and takes, each step.
+    """B episodes that a policy plays side by side, one each: the one loop of all who play.
 
-    A lone episode is the same with the same seeds, whatever it is played for.
+    Whoever plays goes on while episodes are `running`: asks what is expected (`decide`) or only
+    what is done (`turn`), and then takes the step (`take`). The policy is asked once a step. A lone
+    episode is the same with the same seeds, whatever it is played for, and what happens in one
+    episode does not depend on when others end.
 
     Args:
-        estimator: whose expectations are told.
+        estimator: whose expectations are told; None where nobody asks for them.
         environments: B of them.
         rng: of the policy's draws.
-        policy: what the estimator describes, where that is not its own greedy policy.
+        policy: who acts, where that is not the estimator's greedy policy.
+        epsilon: the chance of a random action in place of the policy's.
+        chance: of the random actions.
         max_steps: after which an episode is cut off, if not before.
         stack: what is seen in the midst of episodes that have begun; without it they are reset.
+        memory: what the policy remembers of those.
 
     Attributes:
+        stack: what is seen.
         running: `[B]`, which episodes go on.
         finished: `[B]`, which ones the last step has brought to an end.
         steps: how many have been taken.
@@ -120,76 +119,139 @@ class Playing:
 
     def __init__(
         self,
-        estimator: Estimator,
+        estimator: Estimator | None,
         environments: Environments,
         rng: np.random.Generator,
         *,
         policy: Policy | None = None,
+        epsilon: float = 0.0,
+        chance: np.random.Generator | None = None,
         max_steps: int | None = None,
         stack: FrameStack | None = None,
+        memory: Any = None,
     ) -> None:
         if max_steps is not None and max_steps < 0:
             raise InputError(f"An episode has {max_steps} steps.", "Ask for at least 1.")
         self.environments, self.max_steps, self.steps = environments, max_steps, 0
+        self._begins = stack is None
         if stack is None:
             stack = FrameStack(environments.reset(), environments.stack, environments.padding)
         self.stack = stack
         self.running: BoolArray = np.full(environments.num_envs, max_steps != 0)
         self.finished: BoolArray = ~self.running
         self._estimator, self._policy, self._rng = estimator, policy, rng
+        self._epsilon, self._chance = epsilon, chance or rng
+        self._memory, self._asked = memory, np.arange(environments.num_envs)  # [R], whose it is
+        self._decision: Decision | None = None
+        self._turn: Turn | None = None
         self._last: Any = None
 
-    def decide(self) -> tuple[Decision, IntArray]:
-        """Returns what is expected where episodes go on `[≤ B]`, and the actions drawn `[B]`."""
-        decision = decide(self._estimator, self.stack.observations[self.running], self._policy)
-        actions = np.zeros(len(self.running), dtype=np.int64)
-        actions[self.running] = decision.draw(self._rng)
-        return decision, actions
+    def decide(self) -> Decision:
+        """Returns what is expected where R episodes go on, and how likely each action is."""
+        if self._decision is None:
+            seen = self.stack.observations[self.running]
+            told = self._told(seen)
+            likely = greedy(told.value) if self._policy is None else self._ask(self._policy, seen)
+            self._decision = Decision(told, likely)
+        return self._decision
+
+    def turn(self) -> Turn:
+        """Returns what is done at this step."""
+        if self._turn is None:
+            if self._estimator is None and self._policy is not None:
+                likely = self._ask(self._policy, self.stack.observations[self.running])
+            else:
+                likely = self.decide().probabilities  # [R, A]
+            count = len(self.running)
+            own = np.zeros(count, dtype=np.int64)
+            own[self.running] = _drawn(likely, self._rng.random(count)[self.running])
+            random, actions = np.zeros(count, dtype=np.bool_), own
+            if self._epsilon:
+                random = self.running & (self._chance.random(count) < self._epsilon)
+                any_action = self._chance.integers(self.environments.num_actions, size=count)
+                actions = np.where(random, any_action, own)
+            self._turn = Turn(likely, own, random, actions)
+        return self._turn
 
     def take(self, actions: IntArray) -> Step:
         """Takes a step with these actions `[B]`; where an episode has ended they do not count."""
-        step = self.environments.step(actions)
+        step = self.environments.step(actions, active=self.running)
         self.steps += 1
         over = step.ended | (self.steps == self.max_steps)  # [B]
         self.finished, self.running = self.running & over, self.running & ~over
         self._last = _last_observations(self.stack, step, self.finished)
         self.stack.push(step.following, step.ended)
+        self._decision, self._turn, self._begins = None, None, False
         return step
+
+    def stop(self, where: BoolArray) -> None:
+        """Plays no further `where [B]`."""
+        self.running = self.running & ~where
 
     def at_last(self) -> Decision:
         """Returns what is expected at the true last observations of the finished episodes."""
-        return decide(self._estimator, self._last, self._policy)
+        told = self._told(self._last)
+        if self._policy is None:
+            return Decision(told, greedy(told.value))
+        memory = rows(self._memory, self.finished[self._asked])
+        nowhere = np.zeros(len(self._last), dtype=np.bool_)
+        return Decision(told, ask(self._policy, self._last, memory, nowhere)[0])
+
+    def branch(
+        self, which: IntArray, *, seed: int, rng: np.random.Generator, max_steps: int
+    ) -> "Playing":
+        """Returns copies of episodes at this step, with what their policy remembers of it.
+
+        The policy has been asked about this step: the first thing to do with copies is to `take`.
+
+        Args:
+            which: `[B′]`, the number of the running episode that each is a copy of.
+            seed: of the copies' own chance.
+            rng: of the policy's draws.
+            max_steps: after which a copy is followed no further.
+
+        Raises:
+            NotCopyable: the environments cannot be copied.
+        """
+        if not can_be_copied(self.environments):
+            raise NotCopyable("The environments cannot be copied.", "Give them a method branch.")
+        self.turn()
+        stack = FrameStack(self.stack.newest[which], self.stack.size, self.stack.padding)
+        stack.frames[:] = self.stack.frames[which]
+        return Playing(
+            self._estimator,
+            self.environments.branch(which, seed),
+            rng,
+            policy=self._policy,
+            max_steps=max_steps,
+            stack=stack,
+            memory=rows(self._memory, np.searchsorted(self._asked, which)),
+        )
+
+    def _told(self, observations: Any) -> RewardDecomposition:
+        if self._estimator is None:
+            raise TypeError("Nobody was given who expects anything.")
+        return self._estimator.decompose(observations)
+
+    def _ask(self, policy: Policy, observations: Any) -> FloatArray:
+        """Returns how likely the policy takes each action `[R, A]`, and lets it remember."""
+        memory = rows(self._memory, self.running[self._asked])
+        self._asked = np.flatnonzero(self.running)
+        begins = np.full(len(self._asked), self._begins)
+        likely, self._memory = ask(policy, observations, memory, begins)
+        return likely
 
 
-def play_to(
-    estimator: Estimator,
-    environments: Environments,
-    steps: int,
-    *,
-    policy: Policy | None = None,
-    seed: int = 0,
-) -> FrameStack:
-    """Plays the first environment for some steps, and returns what the agent then sees.
+def can_be_copied(environments: Environments) -> TypeGuard[CopyableEnvironments]:
+    """Returns whether copies of environments can be asked for; each of them may still refuse."""
+    return hasattr(environments, "branch")
 
-    Args:
-        estimator: whose policy is followed.
-        environments: they are reset.
-        steps: how many steps to take.
-        policy: what the estimator describes, where that is not its own greedy policy.
-        seed: of the policy's draws.
 
-    Raises:
-        InputError: the episode is over by then.
-    """
-    playing = Playing(estimator, environments, np.random.default_rng(seed), policy=policy)
-    while playing.steps < steps:
-        step = playing.take(playing.decide()[1])
-        if step.ended[0]:
-            raise InputError(
-                f"There is no step {steps}: the episode is over after {playing.steps} steps.",
-                f"Choose a step from 0 to {playing.steps - 1}.",
-            )
-    return playing.stack
+def _drawn(probabilities: FloatArray, level: FloatArray) -> IntArray:
+    """Returns `[R]`: the action of each that a level in [0, 1) falls to."""
+    cumulative = probabilities.cumsum(axis=1)
+    level = level * cumulative[:, -1]  # which may not be quite 1
+    return np.asarray((cumulative <= level[:, None]).sum(axis=1))
 
 
 def _last_observations(stack: FrameStack, step: Step, where: BoolArray) -> Any:

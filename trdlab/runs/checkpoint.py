@@ -7,13 +7,12 @@ changes, so that checkpoints can share it.
 """
 
 import json
-import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
@@ -22,9 +21,18 @@ from trdlab.errors import InputError, OutputError, TrdlabError, closest
 from trdlab.files import write_whole
 from trdlab.runs.folder import RunFolder
 from trdlab.runs.index import Index, Sum, check_names, read_whole
-from trdlab.runs.keeping import Saved, all_saved, blocks_before, forget, new_folder, sweep
+from trdlab.runs.keeping import (
+    Saved,
+    all_saved,
+    announce,
+    blocks_before,
+    forget,
+    new_folder,
+    sweep,
+)
 from trdlab.runs.state import Arrays, pack, unpack
 
+Read = TypeVar("Read")
 STATE, TENSORS = "state.json", ".safetensors"
 
 
@@ -75,9 +83,10 @@ def save_checkpoint(
     try:
         sweep(run)  # makes room before room is needed
         folder, there = new_folder(run, step), blocks_before(run, step)
-        for name, file in index.block_files.items():
-            if file not in there:
-                write_whole(run.replay / file, partial(Path.write_bytes, data=blocks[name]))
+        new = {name: file for name, file in index.block_files.items() if file not in there}
+        announce(run, folder, {name: index.blocks[name] for name in new})
+        for name, file in new.items():
+            write_whole(run.replay / file, partial(Path.write_bytes, data=blocks[name]))
         write_whole(folder, lambda temporary: _write(temporary, tree, arrays, index.blocks))
     except (OutputError, OSError) as error:
         with suppress(OSError):  # the first failure is the one to tell
@@ -93,36 +102,35 @@ def load_checkpoint(run: RunFolder, step: int | None = None) -> Checkpoint:
         InputError: there is none, or none at that step.
         TrdlabError: it is torn. Another one that is whole is named, and not taken silently.
     """
-    saved = _chosen(run, step)
-    try:
-        return _load(run, saved)
-    except TrdlabError as error:
-        raise _torn(run, saved, error) from error
+    return _read(run, step, partial(_load, run))
 
 
-def read_arrays(run: RunFolder, key: str, step: int | None = None) -> Arrays:
+def read_arrays(run: RunFolder, key: str, step: int | None = None) -> tuple[int, Arrays]:
     """Returns the arrays under one top-level key of a checkpoint's state, reading nothing else.
 
     Args:
-        run: the run.
+        run: the run; it may be trained meanwhile.
         key: such as `q_network`.
         step: of the checkpoint; by default the newest.
+
+    Returns:
+        The step of the checkpoint, and its arrays.
 
     Raises:
         InputError: there is no such checkpoint, or it has no arrays under that key.
         TrdlabError: it is torn. Another one that is whole is named, and not taken silently.
     """
-    saved, name = _chosen(run, step), f"{key}{TENSORS}"
-    try:
+    name = f"{key}{TENSORS}"
+
+    def read(saved: Saved) -> tuple[int, Arrays]:
         files = Index.read(saved.folder).files
-        arrays = _arrays(saved.folder / name, files[name]) if name in files else None
-    except TrdlabError as error:
-        raise _torn(run, saved, error) from error
-    if arrays is None:
+        if name in files:
+            return saved.step, _arrays(saved.folder / name, files[name])
         keys = [name.removesuffix(TENSORS) for name in files if name != STATE]
         cure = closest(key, keys) if keys else ""
         raise InputError(f"The checkpoint at step {saved.step} has no '{key}'.", cure)
-    return arrays
+
+    return _read(run, step, read)
 
 
 def checkpoint_steps(run: RunFolder) -> list[int]:
@@ -145,6 +153,19 @@ def _write(
     for key, held in arrays.items():
         write(f"{key}{TENSORS}", save(held))
     Index(sums, blocks).write(folder)
+
+
+def _read(run: RunFolder, step: int | None, read: Callable[[Saved], Read]) -> Read:
+    """Reads a checkpoint, the newest one unless a step is given, and tells one that is torn."""
+    saved = _chosen(run, step)
+    try:
+        return read(saved)
+    except InputError:
+        raise
+    except TrdlabError as error:
+        if step is None and not saved.folder.exists():  # whoever trains the run has a newer one
+            return _read(run, step, read)
+        raise _torn(run, saved, error) from error
 
 
 def _load(run: RunFolder, saved: Saved) -> Checkpoint:
@@ -186,7 +207,7 @@ def _chosen(run: RunFolder, step: int | None) -> Saved:
     saved = _by_step(run)
     if not saved:
         raise InputError(
-            f"The run '{run.path}' has no checkpoint yet.", f"Train on: {_resume(run)}."
+            f"The run '{run.path}' has no checkpoint yet.", f"Train on: {run.resume_command}."
         )
     if step is not None and step not in saved:
         raise InputError(
@@ -202,7 +223,7 @@ def _not_saved(run: RunFolder, step: int, error: OutputError | OSError) -> Outpu
     begin = f"step {steps[-1]}" if steps else "the beginning"
     return OutputError(
         f"The checkpoint at step {step} cannot be saved: {cause}",
-        f"When it can be written again, {_resume(run)} goes on from {begin}.",
+        f"When it can be written again, {run.resume_command} goes on from {begin}.",
     )
 
 
@@ -213,7 +234,7 @@ def _torn(run: RunFolder, torn: Saved, error: TrdlabError) -> TrdlabError:
         f"The checkpoint at step {torn.step} cannot be used: {error.cause}",
         "No other one is whole."
         if whole is None
-        else f"The one at step {whole} is whole: --checkpoint {whole}, or {run.path}@{whole}.",
+        else f"The one at step {whole} is whole: `checkpoint={whole}`, or {run.path}@{whole}.",
     )
 
 
@@ -223,7 +244,3 @@ def _is_whole(run: RunFolder, saved: Saved) -> bool:
     except TrdlabError:
         return False
     return True
-
-
-def _resume(run: RunFolder) -> str:
-    return f"trdlab resume {shlex.quote(str(run.path))}"

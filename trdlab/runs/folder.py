@@ -4,8 +4,8 @@ import json
 import platform
 import shlex
 import sys
-from collections.abc import Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from trdlab.errors import InputError, OutputError, TrdlabError, closest
-from trdlab.files import read_json, write_whole
+from trdlab.files import check_own, read_json, write_whole
 from trdlab.runs.config import Config, read_config, to_toml
 from trdlab.runs.lock import hold
 
@@ -54,7 +54,8 @@ class RunFolder:
             OutputError: there is something already, or it cannot be written.
         """
         config_text = to_toml(config)
-        manifest_text = json.dumps({**new_manifest(), **(manifest_extra or {})}, indent=1)
+        manifest = {**new_manifest(), **(manifest_extra or {}), "config": config}
+        manifest_text = json.dumps(manifest, indent=1)
         check_free(path)
 
         def write(folder: Path) -> None:
@@ -70,7 +71,7 @@ class RunFolder:
         except OSError as error:
             reason = error.strerror or error
             raise OutputError(
-                f"Cannot make '{path}': {reason}.", "Choose another --out."
+                f"Cannot make '{path}': {reason}.", "Choose another `out`."
             ) from error
         except OutputError:
             check_free(path)  # another process may have made it meanwhile
@@ -82,7 +83,7 @@ class RunFolder:
         """Reads a run's configuration and manifest.
 
         Raises:
-            InputError: there is no run here.
+            InputError: there is no run here, or its configuration was changed since it began.
             TrdlabError: it is torn, or was written by a version whose format is another.
         """
         if not is_run(path):
@@ -93,9 +94,11 @@ class RunFolder:
         try:
             manifest = read_json(path / MANIFEST)
             _check_format(path, manifest)
-            return cls(path, read_config(path / CONFIG), manifest)
+            config = read_config(path / CONFIG)
         except InputError as error:  # the file is the run's, not the user's
             raise TrdlabError(error.cause, "Put it right, or begin another run.") from error
+        _check_unchanged(path, config, manifest)
+        return cls(path, config, manifest)
 
     @property
     def metrics(self) -> Path:
@@ -117,9 +120,34 @@ class RunFolder:
         """The folder with the results of evaluations."""
         return self.path / "evaluations"
 
-    def held(self) -> AbstractContextManager[None]:
-        """Holds the run for this process alone, see `trdlab.runs.lock.hold`."""
-        return hold(self.path)
+    @property
+    def tensorboard(self) -> Path:
+        """The folder with the metrics for TensorBoard."""
+        return self.path / "tensorboard"
+
+    @property
+    def resume_command(self) -> str:
+        """The command that goes on with it, with the module that its own environment needs."""
+        module = str(self.config.get("env", "")).rpartition(":")[0]
+        words = ["trdlab", "resume", str(self.path), *(("--import", module) if module else ())]
+        return shlex.join(words)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Holds the run for this process alone, to write to it (see `trdlab.runs.lock.hold`).
+
+        Raises:
+            TrdlabError: another process holds it.
+            OutputError: it cannot be written; or a part of it is a link, behind which nothing is
+                ever written, cut or deleted.
+        """
+        parts = (self.metrics, self.checkpoints, self.replay, self.evaluations, self.tensorboard)
+        for part in parts:
+            check_own(part)
+        for checkpoint in self.checkpoints.glob("*"):
+            check_own(checkpoint)
+        with hold(self.path):
+            yield
 
 
 def new_manifest() -> dict[str, Any]:
@@ -146,17 +174,17 @@ def check_free(path: Path) -> None:
     if is_run(path):
         raise OutputError(
             f"'{path}' holds a run already.",
-            f"Go on with it: trdlab resume {shlex.quote(str(path))}, or choose another --out.",
+            f"Go on with it: trdlab resume {shlex.quote(str(path))}, or choose another `out`.",
         )
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         kind = "is not empty" if path.is_dir() else "is a file"
-        raise OutputError(f"'{path}' {kind}.", "Choose another --out.")
+        raise OutputError(f"'{path}' {kind}.", "Choose another `out`.")
 
 
 def free_name(parent: Path, stem: str) -> Path:
     """Returns the first of `stem`, `stem-2`, `stem-3`, … that is not there yet."""
     names = (parent / (stem if at == 1 else f"{stem}-{at}") for at in count(1))
-    return next(path for path in names if not path.exists())
+    return next(path for path in names if not path.exists() and not path.is_symlink())
 
 
 def is_run(path: Path) -> bool:
@@ -180,6 +208,21 @@ def _check_format(path: Path, manifest: Any) -> None:
             f"The run '{path}' has format {written}, written by trdlab {author}; "
             f"this is trdlab {_version('trdlab')}, which reads format {FORMAT}.",
             f"Use trdlab {author}{' or newer' if written > FORMAT else ''}.",
+        )
+
+
+def _check_unchanged(path: Path, now: dict[str, Any], manifest: dict[str, Any]) -> None:
+    """Refuses a run that was told something else than its configuration says now."""
+    then = manifest.get("config")
+    if not isinstance(then, dict):
+        raise TrdlabError(f"'{path / MANIFEST}' is torn: it does not say what the run was told.")
+    changed = [key for key in then | now if then.get(key) != now.get(key)]
+    if changed:
+        key = changed[0]
+        said, was = (repr(of[key]) if key in of else "nothing" for of in (now, then))
+        raise InputError(
+            f"'{path / CONFIG}' says {key} = {said}, and the run began with {was}.",
+            "Put it back, or begin another run with that file.",
         )
 
 

@@ -1,16 +1,19 @@
 """Which checkpoints are on disk, which are kept, and what may be deleted."""
 
 import re
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from trdlab.errors import OutputError, TrdlabError
-from trdlab.files import is_leftover, remove
-from trdlab.runs.folder import RunFolder
-from trdlab.runs.index import Index
+from trdlab.files import is_leftover, remove, write_whole
+from trdlab.runs.folder import RunFolder, free_name
+from trdlab.runs.index import INDEX, Index, Sum
 
-FOLDER = re.compile(r"(\d+)(?:\.(\d+))?")  # a step, and which attempt where there were several
+FOLDER = re.compile(r"(\d{9,})(?:\.(\d+))?")  # a step, and which attempt where there were several
+OLD = ".old"
+"""After the name of a checkpoint whose parts may go, as far as its index names them."""
 
 
 class Saved(NamedTuple):
@@ -55,6 +58,23 @@ def blocks_before(run: RunFolder, step: int) -> set[str]:
     return {name for name in known if (run.replay / name).exists()}
 
 
+def announce(run: RunFolder, folder: Path, blocks: Mapping[str, Sum]) -> None:
+    """Writes down which blocks are about to be written, so that they go if their checkpoint fails.
+
+    Args:
+        run: the run.
+        folder: of the checkpoint.
+        blocks: those that are not there yet.
+    """
+
+    def write(temporary: Path) -> None:
+        temporary.mkdir()
+        Index({}, blocks).write(temporary)
+
+    if blocks:
+        write_whole(_old(run, folder), write)
+
+
 def forget(run: RunFolder, step: int, newest: Path, keep: int) -> None:
     """Deletes what the newest checkpoint replaces, and the oldest ones."""
     others = [saved for saved in all_saved(run) if saved.folder != newest]
@@ -62,7 +82,7 @@ def forget(run: RunFolder, step: int, newest: Path, keep: int) -> None:
     kept = earlier[max(0, len(earlier) - keep + 1) :]
     try:
         for folder in (saved.folder for saved in others if saved not in kept):
-            folder.replace(folder.with_name(f".{folder.name}"))  # gone at once; its files follow
+            folder.replace(_old(run, folder))  # gone at once; its files follow
         sweep(run)
     except OSError as error:
         raise OutputError(
@@ -73,7 +93,10 @@ def forget(run: RunFolder, step: int, newest: Path, keep: int) -> None:
 
 
 def sweep(run: RunFolder) -> None:
-    """Deletes what killed processes left, and the blocks that no checkpoint needs."""
+    """Deletes what killed processes left, and what old checkpoints were made of.
+
+    Only what an index of the run names is its own to delete; whatever else lies there stays.
+    """
     for folder in (run.checkpoints, run.replay):
         folder.mkdir(exist_ok=True)  # some ways to copy a run leave out empty folders
         for path in filter(is_leftover, folder.iterdir()):
@@ -82,6 +105,22 @@ def sweep(run: RunFolder) -> None:
         needed = {file for saved in all_saved(run) for file in saved.block_files()}
     except TrdlabError:  # one is torn, and nobody knows what it needs
         return
-    for path in run.replay.iterdir():
-        if path.name not in needed:
-            path.unlink()
+    for folder in sorted(run.checkpoints.glob(f"*{OLD}*")):
+        _delete(run, folder, needed)
+
+
+def _delete(run: RunFolder, folder: Path, needed: Collection[str]) -> None:
+    """Deletes the parts of an old checkpoint, its index last, but for blocks that are `needed`."""
+    with suppress(TrdlabError):  # without an index, nobody knows what was the run's own
+        index = Index.read(folder)
+        for file in index.block_files.values():
+            if file not in needed:
+                (run.replay / file).unlink(missing_ok=True)
+        for name in (*index.files, INDEX):
+            (folder / name).unlink(missing_ok=True)
+    with suppress(OSError):  # somebody has put something else into it
+        folder.rmdir()
+
+
+def _old(run: RunFolder, folder: Path) -> Path:
+    return free_name(run.checkpoints, f"{folder.name}{OLD}")

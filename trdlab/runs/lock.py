@@ -9,7 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from trdlab.errors import OutputError, TrdlabError
-from trdlab.files import read_json, write_json
+from trdlab.files import check_own, read_json, write_json
 
 LOCK, HOLDER = ".lock", ".holder.json"
 PATIENCE = 1.0
@@ -24,9 +24,9 @@ def hold(run: Path) -> Iterator[None]:
 
     Raises:
         TrdlabError: another process holds it.
-        OutputError: the folder cannot be written.
+        OutputError: the folder cannot be written, or the lock is a link.
     """
-    lock = FileLock(run / LOCK)
+    lock = _lock(run)
     try:
         lock.acquire(timeout=PATIENCE, poll_interval=0.1)
     except Timeout as error:
@@ -54,14 +54,20 @@ def holder(run: Path) -> int | None:
 
     Raises:
         OSError: it cannot be told, because the folder cannot be written.
+        OutputError: likewise, because the lock is a link.
     """
     if not (run / LOCK).exists():
         return None
     try:
-        with FileLock(run / LOCK).acquire(timeout=0):
+        with _lock(run).acquire(timeout=0):
             return None
     except Timeout:
         return _written_pid(run)
+
+
+def _lock(run: Path) -> FileLock:
+    check_own(run / LOCK)  # whoever takes it empties the file
+    return FileLock(run / LOCK)
 
 
 def _written_pid(run: Path) -> int:

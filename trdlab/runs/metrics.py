@@ -20,23 +20,24 @@ TAIL_NBYTES = 65536
 class MetricsFile:
     """Appends lines of metrics, each on its way to the disk before `append` returns.
 
+    They are a record, and nothing depends on them: lines may be missing, or the whole file.
+
     Args:
         path: the file; it is made if it is not there.
-        length: the bytes to go on after, as `sync` returned them for a checkpoint. What an
-            interrupted run wrote later is cut off, because it will be written again. Without it,
-            only a line that was not finished is.
+        after: the agent steps to go on after, those of a checkpoint. What an interrupted run wrote
+            of later ones is cut off, because it will be written again. Without it, only a line
+            that was not finished is.
 
     Raises:
-        TrdlabError: the file is shorter than that.
         OutputError: it cannot be written.
     """
 
-    def __init__(self, path: Path, length: int | None = None) -> None:
+    def __init__(self, path: Path, after: int | None = None) -> None:
         self.path = path
         try:
             self._file = path.open("ab", buffering=0)
-            self._length = os.fstat(self._file.fileno()).st_size
-            self._cut(path.read_bytes().rfind(b"\n") + 1 if length is None else length)
+            self._length = _length_until(path.read_bytes(), after)
+            self._file.truncate(self._length)
         except OSError as error:
             raise self._cannot_write(error) from error
 
@@ -58,13 +59,12 @@ class MetricsFile:
             raise self._cannot_write(error) from error
         self._length += len(line)
 
-    def sync(self) -> int:
-        """Waits until all lines are on the disk, and returns their length for a checkpoint."""
+    def sync(self) -> None:
+        """Waits until all lines are on the disk."""
         try:
             os.fsync(self._file.fileno())
         except OSError as error:
             raise self._cannot_write(error) from error
-        return self._length
 
     def close(self) -> None:
         """Ends writing."""
@@ -81,16 +81,6 @@ class MetricsFile:
     ) -> None:
         self.close()
 
-    def _cut(self, length: int) -> None:
-        if length > self._length:
-            self.close()
-            raise TrdlabError(
-                f"'{self.path}' has {self._length} bytes, and had {length} at the checkpoint.",
-                "Put the lines back, or go back to an earlier one: --checkpoint STEP.",
-            )
-        self._file.truncate(length)
-        self._length = length
-
     def _cannot_write(self, error: OSError) -> OutputError:
         return OutputError(
             f"Cannot write '{self.path}': {error.strerror or error}.",
@@ -104,17 +94,18 @@ def read_metrics(path: Path) -> list[dict[str, Any]]:
     Raises:
         TrdlabError: it cannot be read, or a line in the middle is torn.
     """
-    return _rows(path, 0)
+    lines = _lines(path, 0)
+    return [_row(line, f"'{path}', line {number},") for number, line in enumerate(lines, 1)]
 
 
 def last_metrics(path: Path) -> dict[str, Any]:
     """Returns the last whole line of a metrics file, without reading all of it; empty if none.
 
     Raises:
-        TrdlabError: it cannot be read.
+        TrdlabError: it cannot be read, or that line is torn.
     """
-    rows = _rows(path, TAIL_NBYTES)
-    return rows[-1] if rows else {}
+    lines = _lines(path, TAIL_NBYTES)
+    return _row(lines[-1], f"'{path}', the last line,") if lines else {}
 
 
 def _line(row: Row) -> str:
@@ -138,8 +129,30 @@ def _line(row: Row) -> str:
     return json.dumps(plain, allow_nan=False) + "\n"
 
 
-def _rows(path: Path, tail: int) -> list[dict[str, Any]]:
-    """Returns the lines, or those that begin in the last `tail` bytes."""
+def _length_until(data: bytes, steps: int | None) -> int:
+    r"""Returns the bytes of the whole lines before the first one of more agent steps than these.
+
+    >>> _length_until(b'{"agent_steps": 8}\ntorn\n{"agent_steps": 16}\n{"agent_', 8)
+    24
+    """
+    length = 0
+    for line in data.split(b"\n")[:-1]:
+        if steps is not None and _agent_steps(line) > steps:
+            break
+        length += len(line) + 1
+    return length
+
+
+def _agent_steps(line: bytes) -> float:
+    """Returns where the run stood at a line; of one that is torn or was not ours, the beginning."""
+    try:
+        return float(json.loads(line)["agent_steps"])
+    except (ValueError, TypeError, LookupError, RecursionError):
+        return 0.0
+
+
+def _lines(path: Path, tail: int) -> list[bytes]:
+    """Returns the whole lines, or those that begin in the last `tail` bytes."""
     try:
         with path.open("rb") as file:
             start = max(0, os.fstat(file.fileno()).st_size - tail) if tail else 0
@@ -148,9 +161,7 @@ def _rows(path: Path, tail: int) -> list[dict[str, Any]]:
     except OSError as error:
         reason = error.strerror or error
         raise TrdlabError(f"'{path}' cannot be read: {reason}.") from error
-    if start:
-        lines = lines[1:]
-    return [_row(line, f"'{path}', line {at} of those read") for at, line in enumerate(lines, 1)]
+    return lines[1:] if start else lines
 
 
 def _row(line: bytes, where: str) -> dict[str, Any]:
@@ -159,5 +170,5 @@ def _row(line: bytes, where: str) -> dict[str, Any]:
         for name, value in row.pop(NON_FINITE, {}).items():
             row[name] = float(value)
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise TrdlabError(f"{where}, is torn.", "Delete that line.") from error
+        raise TrdlabError(f"{where} is torn.", "Delete that line.") from error
     return row

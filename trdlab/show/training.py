@@ -11,7 +11,7 @@ from trdlab.errors import InputError
 from trdlab.formatting import decimals_for
 from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary, to_toml
-from trdlab.show.page import fit
+from trdlab.show.text import fit
 from trdlab.training.setup import Plan
 
 
@@ -20,6 +20,7 @@ def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
     lines = [
         to_toml(plan.settings.to_config()),
         memory_line(plan.memory, plan.available),
+        *updates_lines(plan.settings),
         f"Time: about {duration(plan.seconds)}, at {plan.steps_per_second:,.0f} agent steps a "
         f"second while learning (measured here, in a few seconds).",
         "Nothing was written: leave out --dry-run to train.",
@@ -29,7 +30,7 @@ def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
 
 def evaluation_page(evaluation: Evaluation, *, ascii_only: bool = False) -> RenderableType:
     """Returns what an agent reached: means with intervals, and how the episodes ended."""
-    count, cut = len(evaluation.returns), int(evaluation.truncated.sum())
+    count = len(evaluation.returns)
     table = Table(box=None, padding=(0, 3, 0, 0), show_header=False, pad_edge=False)
     low, high = float(evaluation.returns.min()), float(evaluation.returns.max())
     decimals = _decimals(low, high)
@@ -42,10 +43,19 @@ def evaluation_page(evaluation: Evaluation, *, ascii_only: bool = False) -> Rend
     span = _span(low, high, decimals)
     table.add_row("least and most", fit(span, ascii_only=ascii_only), "")
     length = f"{evaluation.lengths.mean():,.1f} agent steps"
-    table.add_row("mean length", length, f"{cut} of {count} were cut off" if cut else "")
+    table.add_row("mean length", length, _cut_off(evaluation))
     random = f", {evaluation.epsilon:.1%} random actions" if evaluation.epsilon else ""
     head = f"{count} episodes, greedy{random}, seed {evaluation.seed}; raw rewards, undiscounted"
     return Group(Text(fit(head, ascii_only=ascii_only)), table)
+
+
+def _cut_off(evaluation: Evaluation) -> str:
+    """Returns how many episodes were cut off, and after how many steps where all were alike."""
+    cut, limit = int(evaluation.truncated.sum()), evaluation.max_steps
+    told = f"{cut} of {len(evaluation.lengths)} were cut off"
+    if not cut or limit is None or (evaluation.lengths[evaluation.truncated] != limit).any():
+        return told if cut else ""
+    return f"{told} at step {limit:,}"
 
 
 def runs_table(runs: Sequence[RunSummary], *, ascii_only: bool = False) -> RenderableType:
@@ -96,6 +106,20 @@ def memory_line(needed: int, available: int | None) -> str:
     """
     free = "" if available is None else f", of {_gigabytes(available)} that are free"
     return f"Replay memory: up to {_gigabytes(needed)}{free}."
+
+
+def updates_lines(settings: TrainSettings) -> list[str]:
+    """Returns a line that says that a run will learn nothing; none where it will.
+
+    >>> updates_lines(TrainSettings("gym", "CartPole-v1", agent_steps=900))
+    ['Nothing will be learned: updates begin after 1,000 agent steps, and the run ends after 900.']
+    """
+    if settings.updates_due(settings.agent_steps):
+        return []
+    return [
+        f"Nothing will be learned: updates begin after {settings.learning_starts:,} agent steps, "
+        f"and the run ends after {settings.agent_steps:,}."
+    ]
 
 
 def duration(seconds: float) -> str:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.gridmap import GridMap
 from trdlab.tabular import ExactTable, exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 TIME_AXIS = TimeAxis(0.95, 16)
 _MAP = Path(__file__).parent / "islands.txt"

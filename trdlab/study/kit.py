@@ -76,7 +76,7 @@ def kit_paths(folder: Path) -> tuple[Path, ...]:
     if is_file:
         raise OutputError(f"'{folder}' is a file.", "Name a folder for the kit.")
     if there:
-        raise OutputError(f"The file '{there[0]}' exists.", "Choose another --out.")
+        raise OutputError(f"The file '{there[0]}' exists.", "Choose another `out`.")
     return paths
 
 
@@ -121,7 +121,7 @@ def html(trials: Sequence[Trial]) -> str:
 
 def _unwritable(folder: Path, error: Exception) -> OutputError:
     reason = getattr(error, "strerror", None) or error
-    return OutputError(f"Cannot make '{folder}': {reason}.", "Choose another --out.")
+    return OutputError(f"Cannot make '{folder}': {reason}.", "Choose another `out`.")
 
 
 def _fieldset(trial: Trial, number: int, count: int) -> str:

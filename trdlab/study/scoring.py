@@ -16,7 +16,7 @@ from rich.text import Text
 from trdlab.errors import InputError
 from trdlab.files import read_json
 from trdlab.formatting import percent
-from trdlab.show.page import fit
+from trdlab.show.text import fit
 from trdlab.statistics import Estimate
 from trdlab.study.candidates import LETTERS
 from trdlab.study.kit import SCHEMA

@@ -10,6 +10,7 @@ from trdlab.tabular.totals import undiscounted_totals
 
 if TYPE_CHECKING:
     from trdlab.tabular.environments import from_environment
+    from trdlab.tabular.episodes import ModelEnvironments
     from trdlab.tabular.learned import LearnedTable
     from trdlab.tabular.learning import learn
     from trdlab.tabular.models import from_arrays
@@ -24,6 +25,7 @@ __all__ = [
     "Coordinate",
     "ExactTable",
     "LearnedTable",
+    "ModelEnvironments",
     "OperatorTable",
     "Solution",
     "Spread",
@@ -53,6 +55,7 @@ _HOMES = {
     "from_environment": "environments",
     "make_world": "toytext",
     "tabular_world": "toytext",
+    "ModelEnvironments": "episodes",
     "LearnedTable": "learned",
     "learn": "learning",
     "OperatorTable": "operator",

@@ -1,6 +1,6 @@
 """Testing an estimator of one's own: against the contract, the law, and right answers."""
 
-from trdlab.testing.asking import ContractError, Policy
+from trdlab.testing.asking import ContractError
 from trdlab.testing.audits import ExactAudit, LawAudit
 from trdlab.testing.cases import (
     GOLDEN_SCHEMA,
@@ -20,7 +20,6 @@ __all__ = [
     "ExactAudit",
     "Golden",
     "LawAudit",
-    "Policy",
     "check_against_golden",
     "check_estimator",
     "golden",

@@ -1,6 +1,6 @@
 """Asking an estimator about an environment's observations, with every answer checked."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
@@ -14,10 +14,8 @@ from trdlab.arrays import BoolArray, FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import TrdlabError
 from trdlab.estimator import Estimator
+from trdlab.policies import Who, acting
 from trdlab.tabular.mdp import as_policy
-
-Policy = Callable[[Any], FloatArray]
-"""From observations `[B, ...]` to action probabilities `[B, A]`."""
 
 SAME = 1e-9
 """Of the largest component; what is closer is equal up to rounding."""
@@ -121,7 +119,7 @@ def difference(one: FloatArray, other: FloatArray) -> float:
     return float(np.abs(one - other).max()) / scale if scale else 0.0
 
 
-def probabilities(policy: Policy | None, batch: Any, components: FloatArray) -> FloatArray:
+def probabilities(policy: Who | None, batch: Any, components: FloatArray) -> FloatArray:
     """Returns `[B, A]`: how likely each action is.
 
     Args:
@@ -133,7 +131,9 @@ def probabilities(policy: Policy | None, batch: Any, components: FloatArray) -> 
         InputError: the policy gives something else.
     """
     if policy is not None:
-        return as_policy(policy(batch), components.shape[:-1])
+        begins = np.ones(len(components), dtype=np.bool_)
+        told, _ = acting(policy).act(batch, None, begins)
+        return as_policy(told, components.shape[:-1])
     chosen = np.argmax(near_best(components), axis=1)  # [B]
     return np.asarray(np.eye(components.shape[1])[chosen])
 

@@ -10,10 +10,11 @@ from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition
 from trdlab.errors import InputError
+from trdlab.policies import Who
 from trdlab.tabular import MDP, WindowBuilder, Windows, exact, from_environment
 from trdlab.tabular.environments import start_distribution
 from trdlab.tabular.reach import reachable
-from trdlab.testing.asking import SAME, Asking, Policy, near_best, probabilities
+from trdlab.testing.asking import SAME, Asking, near_best, probabilities
 from trdlab.testing.rollout import Rollout, play
 
 _STEPS = 256  # of the rollout that the law is held against
@@ -71,7 +72,7 @@ class ExactAudit:
 def audit_law(
     asking: Asking,
     env: gym.Env[Any, Any],
-    policy: Policy | None,
+    policy: Who | None,
     mdp: MDP | None,
     *,
     seed: int,
@@ -113,7 +114,7 @@ def audit_law(
 def audit_exact(
     asking: Asking,
     env: gym.Env[Any, Any],
-    policy: Policy | None,
+    policy: Who | None,
     mdp: MDP,
     reference: RewardDecomposition | None,
 ) -> ExactAudit:

@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Any
 
 import gymnasium as gym
@@ -12,8 +11,9 @@ from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
+from trdlab.policies import Who
 from trdlab.tabular import MDP
-from trdlab.testing.asking import Asking, ContractError, Policy, difference
+from trdlab.testing.asking import Asking, ContractError, difference
 from trdlab.testing.audits import ExactAudit, audit_exact, audit_law, matching_model
 from trdlab.testing.report import EstimatorReport
 from trdlab.testing.rollout import discrete_actions, play
@@ -30,7 +30,7 @@ def check_estimator(
     estimator: Estimator,
     env: gym.Env[Any, Any],
     *,
-    policy: Policy | None = None,
+    policy: Who | None = None,
     reference: RewardDecomposition | None = None,
     tolerance: float | None = None,
     precision: float = 1e-4,
@@ -131,13 +131,10 @@ def _nouns(estimator: Any) -> tuple[TimeAxis, Future]:
         raise ContractError(f"time_axis is {axis!r}.", "It must be a trdlab.TimeAxis.")
     if not isinstance(future, Future):
         raise ContractError(f"future is {future!r}.", "It must be a trdlab.Future.")
-    for field in fields(Future):
-        text = getattr(future, field.name)
-        if not isinstance(text, str) or not text.strip():
-            raise ContractError(
-                f"The {field.name} of its future is {text!r}.",
-                "Say whose future it is, in which reward, and what ends it.",
-            )
+    if not future.policy.strip():
+        raise ContractError(
+            f"The policy of its future is {future.policy!r}.", "Say in words whose future it is."
+        )
     return axis, future
 
 

@@ -1,17 +1,26 @@
 """The agent of a run: loaded as an Estimator, and evaluated."""
 
-from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import gymnasium as gym
-
+from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
-from trdlab.errors import TrdlabError
-from trdlab.files import write_json
-from trdlab.rollouts.evaluation import Evaluation, evaluate
-from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
-from trdlab.training.setup import described_space, future, make_environments, use_threads
+from trdlab.environments import Environments, in_batches
+from trdlab.environments.interface import Interface
+from trdlab.environments.making import check_imported
+from trdlab.errors import OutputError, TrdlabError
+from trdlab.files import check_own, write_json
+from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
+from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
+from trdlab.runs import RunFolder, read_arrays
+from trdlab.training.setup import (
+    future,
+    make_environments,
+    use_threads,
+)
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
@@ -34,23 +43,41 @@ def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
         InputError: there is no run, or no such checkpoint.
         TrdlabError: something is torn.
     """
+    return _loaded(RunFolder.open(Path(path)), step)[1]
+
+
+def _loaded(folder: RunFolder, step: int | None) -> tuple[int, "NetworkEstimator"]:
+    """Returns the step of a checkpoint, the newest one unless it is given, and its agent."""
     from trdlab.deep.estimator import NetworkEstimator
     from trdlab.deep.networks import build_network
     from trdlab.deep.update import load_weights
 
-    folder = RunFolder.open(Path(path))
-    settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
-    space, num_actions = _described(folder)
-    network = build_network(space, num_actions, settings.time_axis, hidden=settings.hidden)
-    load_weights(network, read_arrays(folder, "q_network", step))
-    return NetworkEstimator(network, settings.time_axis, future(settings))
+    settings = run_settings(folder)
+    known, hidden = interface_of(folder), settings.hidden
+    actions = len(known.action_names)
+    network = build_network(known.space, actions, settings.time_axis, hidden=hidden)
+    step, weights = read_arrays(folder, "q_network", step)
+    load_weights(network, weights)
+    return step, NetworkEstimator(network, settings.time_axis, future(settings))
 
 
-def _described(folder: RunFolder) -> tuple[gym.Space[Any], int]:
-    """Returns the observation space and the number of actions that a run was made with."""
+def run_settings(folder: RunFolder) -> TrainSettings:
+    """Returns the settings that a run began with.
+
+    Raises:
+        InputError: they are no settings, or out of their range.
+    """
+    return TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
+
+
+def interface_of(folder: RunFolder) -> Interface:
+    """Returns what the agent of a run sees and does.
+
+    Raises:
+        TrdlabError: the manifest is torn.
+    """
     try:
-        environment = folder.manifest["environment"]
-        return described_space(environment["observation"]), int(environment["num_actions"])
+        return Interface.from_dict(folder.manifest["environment"])
     except (LookupError, TypeError, ValueError) as error:
         raise TrdlabError(
             f"The run '{folder.path}' does not say what its agent sees: its manifest is torn.",
@@ -65,9 +92,10 @@ def evaluate_run(
     epsilon: float | None = None,
     seed: int = EVALUATION_SEED,
     step: int | None = None,
-    on_episode: Callable[[int], None] = lambda finished: None,
-) -> tuple[Evaluation, Path]:
-    """Evaluates the agent of a run, and keeps the result in its folder.
+    max_steps: int | None = None,
+    watch: Watch = unwatched,
+) -> tuple[Evaluation, Path | OutputError]:
+    """Evaluates the agent of a run, and keeps the result in its folder if that can be written.
 
     Args:
         path: the run's folder.
@@ -75,27 +103,66 @@ def evaluate_run(
         epsilon: the chance of a random action; likewise.
         seed: of the environments and the random actions.
         step: of an older checkpoint, in agent steps; by default the newest.
-        on_episode: told the number of finished episodes whenever some finish.
+        max_steps: after which an episode is cut off, if not before; by default the environment's
+            own limit, or where it has none what `usual_limit` says.
+        watch: told how far the episodes are.
 
     Returns:
-        The evaluation, and the file that holds it.
+        The evaluation, and the file that holds it, or why it could not be kept.
 
     Raises:
-        InputError: there is no run, no such checkpoint, or the environments cannot be made.
+        InputError: there is no run, no such checkpoint, or the environments cannot be made, or
+            are not what the agent was trained in.
+        NotImported: its environment needs a module that has not been imported.
         TrdlabError: something is torn.
     """
     folder = RunFolder.open(path)
-    settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
-    step = checkpoint_steps(folder)[-1] if step is None and checkpoint_steps(folder) else step
+    settings = run_settings(folder)
+    check_imported(settings.env)
     use_threads(settings)
-    estimator = load(path, step)
+    step, estimator = _loaded(folder, step)
     count = episodes or settings.evaluate_episodes or 30
     chance = settings.evaluate_epsilon if epsilon is None else epsilon
-    environments = make_environments(settings, num_envs=count, seed=seed)
+    parts: list[Evaluation] = []
+
+    def make(num_envs: int, seed: int) -> Environments:
+        return make_environments(settings, num_envs=num_envs, seed=seed)
+
+    for environments in in_batches(make, count, seed):
+        interface_of(folder).check_fits(Interface.of(environments), settings.env)
+        parts.append(
+            evaluate(
+                estimator,
+                environments,
+                epsilon=chance,
+                seed=seed + len(parts),  # a single batch, where there can be one
+                max_steps=_limit(environments, max_steps, settings.time_axis),
+                watch=partial(_watch_all, watch, sum(len(of.returns) for of in parts), count),
+            )
+        )
+    result = joined(parts)
+    limit = f"-max-steps-{max_steps}" if max_steps else ""
+    name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}{limit}.json"
+    return result, _keep(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
+
+
+def _watch_all(watch: Watch, before: int, count: int, now: Progress) -> None:
+    """Tells how far episodes are of which some have been played before these."""
+    watch(replace(now, finished=before + now.finished, episodes=count))
+
+
+def _limit(environments: Environments, given: int | None, axis: TimeAxis) -> int | None:
+    """Returns the steps after which to cut an episode off; None where the environment does."""
+    return given if given or environments.time_limit else usual_limit(axis)
+
+
+def _keep(path: Path, data: dict[str, Any]) -> Path | OutputError:
+    """Writes an evaluation into the folder of its run, or returns why that cannot be done."""
+    with suppress(OSError):  # some ways to copy a run leave out empty folders
+        path.parent.mkdir(exist_ok=True)
     try:
-        result = evaluate(estimator, environments, epsilon=chance, seed=seed, on_episode=on_episode)
-    finally:
-        environments.close()
-    name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}.json"
-    write_json(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
-    return result, folder.evaluations / name
+        check_own(path.parent)
+        write_json(path, data)
+    except OutputError as error:
+        return error
+    return path

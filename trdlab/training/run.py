@@ -13,7 +13,9 @@ from trdlab.deep.memory import check_memory
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
 from trdlab.deep.weights import read_weights
-from trdlab.errors import InputError, TrdlabError
+from trdlab.environments.interface import Interface
+from trdlab.environments.making import check_imported
+from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.runs import (
     MetricsFile,
     RunFolder,
@@ -21,8 +23,10 @@ from trdlab.runs import (
     load_checkpoint,
     save_checkpoint,
 )
-from trdlab.runs.folder import check_free
+from trdlab.runs.folder import check_free, is_run
+from trdlab.training.loading import interface_of, run_settings
 from trdlab.training.setup import (
+    default_path,
     describe,
     make_environments,
     memory_of,
@@ -60,13 +64,18 @@ class Run:
         state = self.trainer.state_dict()
         state["q_network"] = state["learner"].pop("q_network")  # so that it can be read alone
         blocks = state["memory"]["frames"].pop("sealed")
-        state["run"] = {"metrics_length": self.metrics.sync(), "seconds": self.seconds}
+        state["run"] = {"seconds": self.seconds}
+        self.metrics.sync()
         save_checkpoint(self.folder, self.trainer.agent_steps, state, blocks)
 
 
 @contextmanager
-def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
+def begin(settings: TrainSettings, path: Path | None = None) -> Iterator[Run]:
     """Begins a run in a new folder.
+
+    Args:
+        settings: what to do.
+        path: the folder; by default a new one, of a name that no other run takes meanwhile.
 
     Raises:
         InputError: the environments cannot be made, or have no network.
@@ -74,10 +83,10 @@ def begin(settings: TrainSettings, path: Path) -> Iterator[Run]:
         TrdlabError: the replay memory does not fit into what is free.
     """
     with ExitStack() as stack:
-        check_free(path)
+        if path is not None:
+            check_free(path)
         trainer, memory = _trainer(settings, stack)
-        extra = {"environment": describe(trainer.environments), **_given_weights(trainer)}
-        folder = RunFolder.create(path, trainer.settings.to_config(), extra)
+        folder = _new_folder(trainer, path)
         stack.enter_context(folder.held())
         yield Run(folder, trainer, stack.enter_context(MetricsFile(folder.metrics, 0)), memory)
 
@@ -92,19 +101,22 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
 
     Raises:
         InputError: there is no run, no such checkpoint, or its configuration has been changed.
+        NotImported: its environment needs a module that has not been imported.
         TrdlabError: another process holds it, or something is torn.
     """
     folder = RunFolder.open(path)
-    settings = TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
+    settings = run_settings(folder)
+    check_imported(settings.env)
     with ExitStack() as stack:
         stack.enter_context(folder.held())
         trainer, memory = _trainer(settings, stack)
+        interface_of(folder).check_fits(Interface.of(trainer.environments), settings.env)
         if checkpoint_steps(folder) or step is not None:
-            length, seconds, problem = _restore(trainer, folder, step)
+            seconds, problem = _restore(trainer, folder, step)
         else:
             _check_same_weights(folder, _given_weights(trainer))
-            length, seconds, problem = 0, 0.0, None
-        metrics = stack.enter_context(MetricsFile(folder.metrics, length))
+            seconds, problem = 0.0, None
+        metrics = stack.enter_context(MetricsFile(folder.metrics, trainer.agent_steps))
         yield Run(folder, trainer, metrics, memory, seconds, problem)
 
 
@@ -134,8 +146,7 @@ def carry_on(
     if trainer.done:  # and saved
         return True
     saved, since = -1, time.perf_counter()
-    files = run.folder.path / "tensorboard"
-    with board(files, trainer.agent_steps, wanted=settings.tensorboard) as shown:
+    with board(run.folder.tensorboard, trainer.agent_steps, wanted=settings.tensorboard) as shown:
         while not trainer.done and not should_stop():
             before = trainer.agent_steps
             trainer.step()
@@ -166,21 +177,32 @@ def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
     return new_trainer(resolved(settings, environments), environments), memory
 
 
+def _new_folder(trainer: Trainer, path: Path | None) -> RunFolder:
+    """Makes the folder of a run; without a path it looks for a name until one is its own."""
+    extra = {"environment": describe(trainer.environments), **_given_weights(trainer)}
+    while True:
+        place = path or default_path(trainer.settings)
+        try:
+            return RunFolder.create(place, trainer.settings.to_config(), extra)
+        except OutputError:
+            if path or not is_run(place):
+                raise  # else a run that began at the same time was quicker
+
+
 def _restore(
     trainer: Trainer, folder: RunFolder, step: int | None
-) -> tuple[int, float, TrdlabError | None]:
+) -> tuple[float, TrdlabError | None]:
     """Puts a trainer where a checkpoint stands.
 
     Returns:
-        The length of the metrics then, the seconds of training, and what could not be restored.
+        The seconds of training until then, and what could not be restored.
     """
     checkpoint = load_checkpoint(folder, step)
-    state: dict[str, Any] = checkpoint.state
-    _check_unchanged(state["settings"], trainer.settings.to_config(), checkpoint.step)
+    state = checkpoint.state
     state["learner"]["q_network"] = state.pop("q_network")
     state["memory"]["frames"]["sealed"] = checkpoint.blocks
     problem = trainer.load_state_dict(state)
-    return state["run"]["metrics_length"], state["run"]["seconds"], problem
+    return state["run"]["seconds"], problem
 
 
 def _given_weights(trainer: Trainer) -> dict[str, Any]:
@@ -205,14 +227,3 @@ def _check_same_weights(folder: RunFolder, given: dict[str, Any]) -> None:
 
 def _passes(before: int, after: int, every: int) -> bool:
     return after // every > before // every
-
-
-def _check_unchanged(then: dict[str, Any], now: dict[str, Any], step: int) -> None:
-    changed = [key for key in then | now if then.get(key) != now.get(key)]
-    if changed:
-        key = changed[0]
-        raise InputError(
-            f"The configuration says {key} = {now.get(key)!r}, and the checkpoint at {step} agent "
-            f"steps was made with {then.get(key)!r}.",
-            "Put it back, or begin another run with it: trdlab train --config.",
-        )

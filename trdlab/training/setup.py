@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import gymnasium as gym
 import numpy as np
 
 from trdlab.deep.presets import preset
 from trdlab.deep.settings import Kind, TrainSettings
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
-from trdlab.environments.stack import observation_space
+from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.runs import free_name, read_config
@@ -138,29 +137,12 @@ def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer
 
 def describe(environments: Environments) -> dict[str, Any]:
     """Returns what must be known of environments to use their agent without them; plain data."""
-    space = observation_space(environments)
-    if isinstance(space, gym.spaces.Discrete):
-        seen: dict[str, Any] = {"states": int(space.n), "first_state": int(space.start)}
-    else:
-        seen = {"shape": list(space.shape or ()), "dtype": np.dtype(space.dtype).name}
     return {
-        "observation": seen,
-        "num_actions": environments.num_actions,
-        "first_action": environments.first_action,
-        "action_names": list(environments.action_names),
+        **Interface.of(environments).to_dict(),
         "time_limit": environments.time_limit,
         "frame_skip": environments.frame_skip,
         "frames_per_second": environments.frames_per_second,
     }
-
-
-def described_space(observation: Mapping[str, Any]) -> gym.spaces.Space[Any]:
-    """Returns the observation space that `describe` wrote down (bounds are not kept)."""
-    if "states" in observation:
-        return gym.spaces.Discrete(observation["states"], start=observation["first_state"])
-    dtype = np.dtype(observation["dtype"])
-    low, high = (0, 255) if dtype == np.uint8 else (-np.inf, np.inf)
-    return gym.spaces.Box(low, high, tuple(observation["shape"]), dtype=dtype.type)
 
 
 def future(settings: TrainSettings) -> Future:
@@ -168,9 +150,7 @@ def future(settings: TrainSettings) -> Future:
     policy = "the greedy policy of the network"
     if settings.width > 1:
         policy += f" (for the first {settings.width} steps, the ε-greedy one it learned from)"
-    reward = "sign of each reward" if settings.clip_rewards else Future(policy).reward
-    ending = "a lost life, or the end of the game" if settings.life_loss_ends else "terminal states"
-    return Future(policy, reward, ending)
+    return Future(policy, settings.clip_rewards, settings.life_loss_ends)
 
 
 @dataclass(frozen=True)

@@ -8,21 +8,23 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from by_hand import Given, episode, occupancy
+from by_hand import Given, episode, exact_tails, occupancy
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Step
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import ModelEnvironments
-from trdlab.explanations.calibration.calibration import calibrate, endings
-from trdlab.explanations.calibration.errors import blame, is_off
-from trdlab.explanations.calibration.residual import exact_tails, hidden, sufficient_horizon
+from trdlab.explanations.calibration.calibration import Calibration, calibrate
+from trdlab.explanations.calibration.errors import errors_of, is_off
+from trdlab.explanations.calibration.residual import residual_of
+from trdlab.explanations.calibration.score import score_of
 from trdlab.explanations.calibration.trust import trust
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.rollouts.episodes import Counting, Episode, collect
+from trdlab.policies import Memoryless
+from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import pool, what_followed
 from trdlab.tabular import ExactTable, exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 AXIS = TimeAxis(0.95, 20)
 
@@ -49,7 +51,7 @@ def played(
     return collect(
         Given(components, axis, Future("the given policy")),
         environments,
-        policy=lambda states: table.solution.policy[states],
+        policy=Memoryless(lambda states: table.solution.policy[states]),
         epsilon=epsilon,
         seed=seed,
     )
@@ -107,8 +109,8 @@ def test_of_a_residual_the_short_episodes_alone_tell_nothing():
     long = episode([1.0] * 9, axis, terminated=False)
     assert pool(ended).known.all()
     assert not pool([*ended, long]).known[:, -1].any()
-    assert hidden(ended).observed_tails.size > 0
-    assert hidden([*ended, long]).observed_tails.size == 0, "nor does the N that would suffice"
+    assert residual_of(ended).observed_tails.size > 0
+    assert residual_of([*ended, long]).observed_tails.size == 0, "nor does the N that would suffice"
 
 
 def test_beyond_a_time_limit_nothing_is_known_even_if_the_episode_ended_in_time():
@@ -144,7 +146,7 @@ class Scripted:
         self.now = 5
         return np.array([[5]])
 
-    def step(self, actions: Any) -> Step:
+    def step(self, actions: Any, active: Any = None) -> Step:
         self.now += 1
         over = np.array([self.now == 9])
         frames = np.array([[self.now]])
@@ -161,7 +163,10 @@ class Scripted:
 class Last:
     """Predicts the sum of the frames it sees, for action 1."""
 
-    time_axis, future = TimeAxis(0.5, 1), Future("the greedy policy")
+    time_axis = TimeAxis(0.5, 1)
+
+    def __init__(self, **counts: bool) -> None:
+        self.future = Future("the greedy policy", **counts)
 
     def decompose(self, observations: Any) -> RewardDecomposition:
         components = np.zeros((len(observations), 2, 2))
@@ -170,13 +175,14 @@ class Last:
 
 
 def test_collect_keeps_what_was_predicted_up_to_the_true_last_observation():
-    (episode,) = collect(Last(), Scripted(), counting=Counting(True, True))  # type: ignore[arg-type]
+    clipped = Last(clip_rewards=True, life_loss_ends=True)
+    (episode,) = collect(clipped, Scripted())  # type: ignore[arg-type]
     assert episode.actions.tolist() == [1, 1, 1, 1]
     assert episode.predicted[:, 0].tolist() == [5, 11, 13, 15]  # 0 + 5, 5 + 6, 6 + 7, 7 + 8
     assert episode.expected[:, 0].tolist() == [5, 11, 13, 15, 17]  # and 8 + 9 at the end
     assert episode.rewards.tolist() == [1.0] * 4  # clipped
     assert episode.ends.tolist() == [False, True, False, True]
-    assert endings([episode]).life_losses == 1
+    assert score_of([episode]).life_losses == 1
     (raw,) = collect(Last(), Scripted())  # type: ignore[arg-type]
     assert raw.rewards.tolist() == [3.0] * 4
     assert raw.ends.tolist() == [False, False, False, True]
@@ -187,7 +193,7 @@ def test_random_actions_do_not_bias_what_is_known():
     found = calibrate(played(table, num=600, epsilon=0.1, time_limit=None))
     inside = (found.bias.low <= 1e-12) & (found.bias.high >= -1e-12)
     assert inside[:-1].mean() >= 0.8
-    assert found.states[-1] == "unknown"  # where a random action may come, the rest is not known
+    assert found.status[-1] == "not tested"  # where a random action may come, the rest is not known
     with pytest.raises(InputError, match=r"ε is 1\.0"):
         played(table, epsilon=1.0)
 
@@ -206,14 +212,13 @@ def test_bias_error_skill_and_correlation_by_hand():
     assert found.error.value[0] == pytest.approx(0.25)
     assert found.variance[0] == pytest.approx(1.0)
     assert found.skill.value[0] == pytest.approx(0.75)
-    assert found.correlation.value[0] == pytest.approx(np.corrcoef(rewards, predicted)[0, 1])
-    assert found.states[0] == "too few episodes"
+    assert (found.status[0], found.num_episodes[0], found.enough[0]) == ("open", 1, 10)
     assert np.isnan(found.skill.low[0])
 
 
 def test_intervals_are_those_of_drawing_whole_episodes():
     episodes = played(circuit(TimeAxis(0.95, 2)), num=12)
-    found = calibrate(episodes, resamples=4_000)
+    found = calibrate(episodes)
     observed = [what_followed(episode)[0][:, 0] for episode in episodes]
     predicted = [episode.predicted[:, 0] for episode in episodes]
     rng, skills = np.random.default_rng(3), []
@@ -223,47 +228,64 @@ def test_intervals_are_those_of_drawing_whole_episodes():
         p = np.concatenate([predicted[e] for e in drawn])
         skills.append(1.0 - ((p - o) ** 2).mean() / o.var())
     low, high = np.quantile(skills, [0.025, 0.975])
-    assert found.skill.low[0] == pytest.approx(low, abs=0.01)
-    assert found.skill.high[0] == pytest.approx(high, abs=0.01)
+    assert found.skill.low[0] == pytest.approx(low, abs=0.02)
+    assert found.skill.high[0] == pytest.approx(high, abs=0.02)
 
 
-def test_constant_rewards_are_nothing_to_predict_and_no_number():
-    axis = TimeAxis(0.9, 3)
-    constant = [episode([1.0] * n, axis, terminated=False) for n in range(20, 32)]
-    found = calibrate(constant)
-    assert found.states == ("nothing to predict",) * 3 + ("unknown",)
-    assert np.isnan(found.skill.value).all()
-    assert found.error.value[:3] == pytest.approx(axis.discounts[:3] ** 2)
-    trusted = trust(found)  # wrong, where there was nothing to predict
-    assert (trusted.components, trusted.last_step) == (0, None)
+def constant(reward: float, expected: float, episodes: int = 50) -> Calibration:
+    """Calibrates one and the same forecast of rewards that are always the same, at N = 3."""
+    axis, rng = TimeAxis(0.5, 3), np.random.default_rng(0)
 
-
-def test_a_constant_reward_may_be_predicted_a_little_wrong():
-    axis = TimeAxis(0.9, 3)
-
-    def predicting(amount: float) -> Episode:
-        components = np.broadcast_to(amount * axis.discounts, (30, 1, 4))
+    def one() -> Episode:  # different in what is expected of the last step only
+        components = np.broadcast_to(expected * axis.discounts, (20, 1, 4)).copy()
+        components[-1] *= rng.uniform(0.99, 1.0)
         decomposition = RewardDecomposition(components, axis)
-        return episode([2.0] * 30, axis, decomposition=decomposition, terminated=False)
+        return episode([reward] * 20, axis, decomposition=decomposition, terminated=False)
 
-    assert trust(calibrate([predicting(1.9)])).components == 3  # within a tenth
-    assert trust(calibrate([predicting(1.7)])).components == 0
+    return calibrate([one() for _ in range(episodes)])
 
 
-def test_rewards_that_never_come_and_are_not_predicted_are_no_evidence():
-    found = calibrate([episode([0.0] * n, TimeAxis(0.9, 3)) for n in range(20, 32)])
-    trusted = trust(found)
-    assert (trusted.components, trusted.tested, trusted.last_step) == (3, 0, None)
-    assert not trusted.is_whole
+@pytest.mark.parametrize(
+    ("expected", "episodes", "status"),
+    [
+        (2.1, 50, "good"),  # within a tenth
+        (1.0, 50, "bad"),
+        (1.5, 3, "open"),  # what comes with a chance of up to 0.71 could have been missed
+        (0.0, 50, "bad"),
+    ],
+)
+def test_a_reward_that_is_always_the_same_is_forecast_right_or_wrong(expected, episodes, status):
+    found = constant(2.0, expected, episodes)
+    assert found.status == (status,) * 3 + ("not tested",)
+    assert found.constant.tolist() == [True, True, True, False]
+    assert np.isnan(found.skill.value).all()
+    assert trust(found).components == (3 if status == "good" else 0)
+
+
+def test_rewards_that_never_come_and_are_not_expected_are_no_evidence():
+    found = constant(0.0, 0.0)
+    assert set(found.status) == {"not tested"}
+    assert trust(found).last_step is None
+    assert trust(found).doubtful.all()
+    assert constant(0.0, 1.0).status[:3] == ("bad",) * 3, "a reward that was expected all the time"
+
+
+def test_before_a_reward_that_comes_it_is_right_to_expect_none():
+    axis = TimeAxis(0.5, 4)
+    rows = [axis.discounts * np.eye(5)[2] * (t == 0) for t in range(4)]  # 1 in two steps, at first
+    found = calibrate([episode([0.0, 0.0, 1.0], axis, rows) for _ in range(12)])
+    assert found.status == ("open", "open", "open", "not tested", "not tested")
+    branching = [episode([0.0, 0.0, 0.0, float(i % 2)], axis) for i in range(4)]
+    assert calibrate(branching).status[0] == "open"
 
 
 def test_one_episode_played_again_and_again_is_one_episode():
     world = Gridworld(load_map("drone"))  # without chance
     episodes = played(exact(world.mdp, TimeAxis(0.95, 4)), num=30)
     found = calibrate(episodes)
-    assert "judged" not in found.states
+    assert not {"good", "bad"} & set(found.status)
     assert set(found.num_episodes) == {1}
-    assert blame(pool(episodes)).shift == 0
+    assert errors_of(pool(episodes)).shift == 0
 
 
 def test_reliability_is_on_the_diagonal_for_an_exact_table():
@@ -287,7 +309,7 @@ def test_rewards_of_several_amounts_have_no_reliability():
 @pytest.mark.parametrize("seed", range(3))
 def test_a_perfect_table_is_trusted_to_the_end(seed: int):
     calibration = calibrate(played(circuit(), seed=seed))
-    assert calibration.is_("unknown").tolist() == [False] * 20 + [True]  # it never ends
+    assert calibration.is_("not tested").tolist() == [False] * 20 + [True]  # it never ends
     found = trust(calibration)
     assert found.is_whole
     assert found.last_step == 19
@@ -296,44 +318,38 @@ def test_a_perfect_table_is_trusted_to_the_end(seed: int):
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_beyond_step_10_ends_the_trust_there(seed: int):
     found = trust(calibrate(played(circuit(), noisy, seed=seed)))
-    assert (found.components, found.at_most, found.last_step) == (10, 10, 9)
+    assert (found.components, found.last_step) == (10, 9)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_rewards_predicted_two_steps_late_are_found_and_not_trusted(seed: int):
     episodes = played(circuit(), late, seed=seed)
     assert trust(calibrate(episodes)).last_step is None
-    found = blame(pool(episodes))
+    found = errors_of(pool(episodes))
     assert found.shift == 2
     assert not is_off(found.amount)
-    assert np.nansum(found.timing) > 0.3 * np.nansum(found.error)
-    assert np.isnan(found.error[-2:]).all()  # what is predicted for later than N
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_rewards_scaled_by_one_and_a_half_are_found(seed: int):
-    found = blame(pool(played(circuit(), lambda rewards: 1.5 * rewards, seed=seed)))
+    found = errors_of(pool(played(circuit(), lambda rewards: 1.5 * rewards, seed=seed)))
     assert found.shift == 0
     assert is_off(found.amount)
     assert found.amount.low < 1.5 < found.amount.high
-    assert np.nansum(found.scale) > 0.05 * np.nansum(found.error)
-    assert np.nansum(found.sharpness) == pytest.approx(0.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_smeared_rewards_are_found(seed: int):
-    found = blame(pool(played(circuit(), smeared, seed=seed)))
+    found = errors_of(pool(played(circuit(), smeared, seed=seed)))
     assert found.shift == 0
     assert not is_off(found.amount)
     assert found.smear.low > 0.2
-    assert np.nansum(found.sharpness) > 0.0
 
 
-def test_the_parts_of_an_error_add_up_to_it():
-    found = blame(pool(played(circuit(), lambda rewards: 1.5 * late(rewards))))
+def test_a_shift_is_found_beside_a_wrong_amount():
+    found = errors_of(pool(played(circuit(), lambda rewards: 1.5 * late(rewards))))
     assert found.shift == 2
-    parts = found.timing + found.scale + found.sharpness + found.rest
-    assert parts == pytest.approx(found.error, nan_ok=True)
+    assert found.amount.low < 1.5 < found.amount.high
 
 
 def test_groups_are_calibrated_and_trusted_in_steps():
@@ -343,7 +359,7 @@ def test_groups_are_calibrated_and_trusted_in_steps():
 
 def test_blame_refuses_what_has_no_neighbours():
     with pytest.raises(InputError, match="cannot stand in for each other"):
-        blame(pool(played(circuit(TimeAxis(0.95, 1)))))
+        errors_of(pool(played(circuit(TimeAxis(0.95, 1)))))
 
 
 # ---- the residual --------------------------------------------------------------------------------
@@ -353,17 +369,15 @@ def test_what_the_residual_hides_by_hand():
     axis = TimeAxis(0.5, 1)
     components = np.array([[[1.0, 1.0], [0.0, -1.0]], [[0.0, 3.0], [2.0, 0.0]]])  # [T, A, N+1]
     decomposition = RewardDecomposition(components, axis)
-    found = hidden([episode([1.0, 0.0], axis, decomposition=decomposition)])
+    found = residual_of([episode([1.0, 0.0], axis, decomposition=decomposition)])
     assert found.value.value == pytest.approx(4.0 / 5.0)  # of 1, 1 and 0, 3
     assert found.gap.value == pytest.approx(5.0 / 8.0)  # of 1, 2 and −2, 3
-    assert found.tails.tolist() == pytest.approx([1.0, 0.8])
 
 
 def test_the_horizon_that_suffices_is_read_off_the_rewards():
     table = exact(Gridworld(load_map("patience").with_slip(0.2)).mdp, TimeAxis(0.95, 2))
-    found = hidden(played(table, num=400, time_limit=None))
+    found = residual_of(played(table, num=400, time_limit=None))
     tails = exact_tails(table, occupancy(table), 60)
     assert found.observed_tails[:15] == pytest.approx(tails[:15], abs=0.03)
-    least = sufficient_horizon(tails)
-    assert least is not None
+    least = int(np.flatnonzero(tails <= 0.05)[0])
     assert found.sufficient() in (least - 1, least, least + 1)

@@ -7,22 +7,20 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from by_hand import occupancy
+from by_hand import exact_ceiling, occupancy
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.environments.stack import FrameStack
+from trdlab.environments import GymEnvironments
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explain.copies import CopyableGymEnvironments, ModelEnvironments
 from trdlab.explanations.calibration.calibration import calibrate
-from trdlab.explanations.calibration.ceiling import ceiling, exact_ceiling
+from trdlab.explanations.calibration.ceiling import ceiling_of
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.intervals import Estimates
 from trdlab.rollouts.branches import Branching
 from trdlab.rollouts.counterfactual import counterfactual
-from trdlab.rollouts.episodes import collect
-from trdlab.rollouts.playing import play_to
-from trdlab.tabular import ExactTable, exact, from_environment
+from trdlab.rollouts.episodes import Recording, collect
+from trdlab.statistics import Estimates
+from trdlab.tabular import ExactTable, ModelEnvironments, exact, from_environment
 
 AXIS = TimeAxis(0.95, 12)
 DRONE = Gridworld(load_map("drone").with_slip(0.2))
@@ -60,9 +58,9 @@ def test_model_environments_draw_from_the_model_and_are_restored_to_the_bit():
 
 
 def test_the_ceiling_of_an_exact_model_is_found_from_copies():
-    environments = ModelEnvironments(bridge().mdp, 300, seed=1)
+    environments = ModelEnvironments(bridge().mdp, 300, seed=101)
     branches = Branching(bridge(), copies=6, steps=300).along(environments, every=3)
-    found = ceiling(branches)
+    found = ceiling_of(branches)
     true = exact_ceiling(bridge(), occupancy(bridge()))
     assert inside(found.skill, true) >= 0.8
     assert np.abs(found.skill.value - true).max() < 0.06
@@ -81,7 +79,7 @@ def test_where_a_coin_decides_the_ceiling_is_zero():
     fair = [(0.5, 0, 1.0, False), (0.5, 0, 0.0, False)]
     table = exact(MDP.from_transitions([[fair]]), TimeAxis(0.9, 3))
     environments = ModelEnvironments(table.mdp, 100, seed=0, time_limit=40)
-    found = ceiling(Branching(table, copies=4).along(environments, every=5)).skill
+    found = ceiling_of(Branching(table, copies=4).along(environments, every=5)).skill
     assert np.abs(found.value[:3]).max() < 0.1
     assert ((found.low <= 0.0) & (found.high >= 0.0))[:3].all()
 
@@ -89,20 +87,20 @@ def test_where_a_coin_decides_the_ceiling_is_zero():
 def test_gymnasium_environments_are_copied_with_fresh_chance():
     lake = from_environment(gym.make("FrozenLake-v1"))
     table = exact(lake, TimeAxis(0.95, 3))
-    environments = CopyableGymEnvironments("FrozenLake-v1", 2, seed=0)
+    environments = GymEnvironments("FrozenLake-v1", 2, seed=0)
     environments.reset()
     copies = environments.branch(np.zeros(60, dtype=np.int64), seed=1)
     reached = copies.step(np.full(60, 2)).frames
     assert set(reached.tolist()) == {0, 1, 4}  # right, slipping up or down
     assert environments.step(np.array([2, 2])).frames.shape == (2,)  # those stay as they were
     branches = Branching(table, copies=3).along(
-        CopyableGymEnvironments("FrozenLake-v1", 12, seed=0), every=10
+        GymEnvironments("FrozenLake-v1", 12, seed=0), every=10
     )
-    assert not ceiling(branches, resamples=50).deterministic
+    assert not ceiling_of(branches).deterministic
 
 
 def test_without_chance_the_ceiling_says_so():
-    cart = CopyableGymEnvironments("CartPole-v1", 12, seed=0)
+    cart = GymEnvironments("CartPole-v1", 12, seed=0)
 
     class Sway:
         time_axis, future = TimeAxis(0.9, 5), Future("the greedy policy")
@@ -112,7 +110,7 @@ def test_without_chance_the_ceiling_says_so():
             components[:, 1, 0] = observations[:, 2]  # pushes to where the pole leans
             return RewardDecomposition(components, self.time_axis)
 
-    found = ceiling(Branching(Sway(), copies=2).along(cart, every=7), resamples=50)
+    found = ceiling_of(Branching(Sway(), copies=2).along(cart, every=7))
     assert found.deterministic
     assert found.skill.value[3] == pytest.approx(1.0)
     assert np.isnan(found.skill.value[0])  # 1 at every step: nothing varies
@@ -131,12 +129,12 @@ def test_foils_of_an_exact_table_are_predicted_without_bias():
 def test_a_counterfactual_contrast_agrees_with_the_exact_one():
     table = exact(DRONE.mdp, AXIS)
     environments = ModelEnvironments(DRONE.mdp, 1, seed=0)
-    stack = play_to(table, environments, 0)
+    playing = Recording(table, environments).playing
     branching = Branching(table, copies=200, steps=400)
     true = (table.decomposition[0, 1] - table.decomposition[0, 0]).components
     shares = []
     for seed in range(5):
-        found = counterfactual(branching, environments, stack, 1, 0, seed=seed)
+        found = counterfactual(branching, playing, 1, 0, seed=seed)
         assert found.predicted == pytest.approx([*true, true.sum()])
         assert np.abs(found.observed.value - found.predicted).max() < 0.4
         shares.append(inside(found.observed, found.predicted))
@@ -146,13 +144,13 @@ def test_a_counterfactual_contrast_agrees_with_the_exact_one():
 def test_counterfactuals_refuse_what_is_not_there():
     table, environments = bridge(), ModelEnvironments(bridge().mdp, 1, seed=0)
     with pytest.raises(InputError, match=r"There is no step 500: the episode is over after \d+"):
-        play_to(table, environments, 500)
-    stack = FrameStack(environments.reset(), None, "reset")
+        Recording(table, environments).play_to(500)
+    playing = Recording(table, environments).playing
     with pytest.raises(InputError, match="both 1"):
-        counterfactual(Branching(table), environments, stack, 1, 1)
+        counterfactual(Branching(table), playing, 1, 1)
     with pytest.raises(InputError, match=r"no action 7.*0 to 3"):
-        counterfactual(Branching(table), environments, stack, 7, 1)
+        counterfactual(Branching(table), playing, 7, 1)
     with pytest.raises(InputError, match="reach 12 steps"):
         Branching(table, steps=5)
     with pytest.raises(InputError, match="at least 2 of both"):
-        ceiling(Branching(table, copies=1).along(environments, every=2))
+        ceiling_of(Branching(table, copies=1).along(environments, every=2))

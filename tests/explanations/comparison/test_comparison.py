@@ -5,17 +5,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from trdlab.explanations.comparison.findings import comparison_findings
 
-from trdlab.agents import Agent, gridworld_agent
+from trdlab.agents import Agent, find_pair, gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations import moment_at
 from trdlab.explanations.comparison import background, differences
-from trdlab.explanations.comparison.compare import compare, find_pair
-from trdlab.explanations.comparison.findings import comparison_findings
-from trdlab.explanations.comparison.report import Comparison, centre, compared
+from trdlab.explanations.comparison.comparing import compare
+from trdlab.explanations.comparison.comparison import Comparison, centre, compared
 from trdlab.explanations.comparison.states import Visits, visit
+from trdlab.policies import Memoryless
 from trdlab.rollouts.playing import Progress
 from trdlab.tabular import ExactTable
 
@@ -156,7 +157,9 @@ def test_episodes_that_both_play_alike_tell_of_the_same_chance_once():
 
 def test_episodes_that_do_not_end_are_cut_off_and_it_says_so():
     agent = gridworld_agent("drone", AXIS)
-    stuck = replace(agent, policy=lambda states: np.tile([1.0, 0.0, 0.0, 0.0], (len(states), 1)))
+    stuck = replace(
+        agent, policy=Memoryless(lambda states: np.tile([1.0, 0.0, 0.0, 0.0], (len(states), 1)))
+    )
     comparison = compare(stuck, agent, episodes=6, judged_by=0, max_steps=30)
     found = kinds(comparison)
     assert (found["some-cut-off"].episodes, found["some-cut-off"].steps) == (6, 30)
@@ -194,7 +197,7 @@ def test_every_state_can_be_explained_by_the_one_who_came_there(is_random):
     place = gridworld_agent("ledge,slip=0.3", AXIS)
     other = replace(gridworld_agent("ledge", AXIS), make=place.make)
     if is_random:
-        other = replace(other, policy=lambda states: np.full((len(states), 4), 0.25))
+        other = replace(other, policy=Memoryless(lambda states: np.full((len(states), 4), 0.25)))
     visits = visit((place, other), episodes=4, seed=7, most_states=40)
     for m, (player, seed, step) in enumerate(
         zip(visits.player, visits.seed, visits.step, strict=True)
@@ -221,7 +224,7 @@ def test_it_is_told_whose_forecasts_can_be_trusted():
 
     heard: list[Progress] = []
     comparison = compare(
-        agent, changed(agent, worse), episodes=5, judged_by=200, watch=heard.append
+        agent, changed(agent, worse), episodes=5, judged_by=400, watch=heard.append
     )
     found = kinds(comparison)
     assert (found["trusted-all-along"].side, found["trusted-all-along"].step) == ("A", 3)
@@ -231,13 +234,15 @@ def test_it_is_told_whose_forecasts_can_be_trusted():
         "episodes to judge by A",
         "episodes to judge by B",
     ]
-    assert (heard[-1].finished, heard[-1].episodes) == (200, 200)
+    assert (heard[-1].finished, heard[-1].episodes) == (400, 400)
 
 
 def test_different_futures_are_each_told():
     one = np.ones((12, 2))
     comparison = told(one, 2 * one, TimeAxis(0.9, 1))
-    clipped = replace(comparison, futures=(Future("the policy"), Future("another", "sign")))
+    clipped = replace(
+        comparison, futures=(Future("the policy"), Future("another", clip_rewards=True))
+    )
     tells = [f for f in comparison_findings(clipped) if isinstance(f, background.OneTells)]
     assert [(f.side, f.policy) for f in tells] == [("A", "the policy"), ("B", "another")]
     assert all(f.holds(clipped) for f in tells)

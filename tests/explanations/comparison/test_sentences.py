@@ -10,23 +10,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
+from trdlab.explanations.comparison.differences import ComparisonFinding
+from trdlab.explanations.comparison.findings import comparison_findings
+from trdlab.intervals import Estimates
+from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page
+from trdlab.show.comparison_data import comparison_to_dict
 
 import mutants
-from trdlab.agents import Agent, gridworld_agent
+from trdlab.agents import Agent, find_pair, gridworld_agent
 from trdlab.cli import main
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations import assess
 from trdlab.explanations.calibration.report import TrustReport
 from trdlab.explanations.calibration.trust import trust
-from trdlab.explanations.comparison.compare import compare, find_pair
-from trdlab.explanations.comparison.differences import ComparisonFinding
-from trdlab.explanations.comparison.findings import comparison_findings
-from trdlab.explanations.comparison.report import Comparison, compared
+from trdlab.explanations.comparison.comparing import compare
+from trdlab.explanations.comparison.comparison import Comparison, compared
 from trdlab.explanations.comparison.states import Visits
-from trdlab.intervals import Estimates
-from trdlab.show.comparison import TEMPLATES, check_comparison, comparison_sentences, page
-from trdlab.show.comparison_data import comparison_to_dict
+from trdlab.policies import Memoryless
 from trdlab.show.plots.comparison import comparison_figure
 from trdlab.tabular import ExactTable
 
@@ -69,7 +70,9 @@ def reports() -> tuple[TrustReport | None, ...]:
         return replace(agent, estimator=worse)
 
     nothing = gridworld_agent("ledge,exploring_starts=true", axis)
-    still = replace(nothing, policy=lambda states: np.eye(4)[np.zeros(len(states), dtype=int)])
+    still = replace(
+        nothing, policy=Memoryless(lambda states: np.eye(4)[np.zeros(len(states), dtype=int)])
+    )
     zero = RewardDecomposition(np.zeros((8, 4, 4)), axis)
     table = nothing.estimator
     assert isinstance(table, ExactTable)
@@ -136,7 +139,7 @@ def comparisons(draw: st.DrawFn) -> Comparison:
         cut=draw(st.sampled_from([0, 0, 7])),
     )
     one, other = draw(st.permutations(range(7)))[:2]
-    futures = Future("the optimal policy"), Future("the greedy policy", "sign of each reward")
+    futures = Future("the optimal policy"), Future("the greedy policy", clip_rewards=True)
     return compared(
         visits,
         names=("one", "other"),

@@ -5,12 +5,12 @@ import pytest
 
 from by_hand import episode
 from trdlab.decomposition import TimeAxis
-from trdlab.explain.copies import ModelEnvironments
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.revision import revise
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.rollouts.episodes import collect
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 SHORT = ([1.0, 2.0], TimeAxis(0.5, 2), [[0.0, 1.0, 2.0], [2.0, 1.0, 0.0], [4.0, 2.0, 2.0]])
 

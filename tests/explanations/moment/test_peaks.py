@@ -1,19 +1,16 @@
 """Peaks and rhythm of vectors whose bumps are known, and of maps that pay again and again."""
 
-import re
-
 import numpy as np
 import pytest
 from scipy.signal import peak_prominences
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations import explain, sentence
 from trdlab.explanations.calibration.trust import Trust
-from trdlab.explanations.claims import Finding
 from trdlab.explanations.moment.exact import gridworld_moment
+from trdlab.explanations.moment.forecast import forecast
 from trdlab.explanations.moment.moment import Moment
-from trdlab.explanations.moment.peaks import Peak, Peaks, Rhythm, Spread, Steady, peaks, prominence
+from trdlab.explanations.moment.peaks import peaks, prominence
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import exact
 
@@ -38,9 +35,8 @@ def learned(row: np.ndarray, width: int = 1, trusted: int | None = None, **known
     return Moment(components, ("go",), Future("the greedy policy"), trust=trust, **known)  # type: ignore[arg-type]
 
 
-def told(moment: Moment) -> dict[type[Finding], str]:
-    explanation = explain(moment, "go")
-    return {type(x): sentence(x, explanation) for x in explanation.forecast}
+def told(moment: Moment) -> dict[str, str]:
+    return {claim.kind: claim.sentence for claim in forecast(moment.choice("go"))}
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -52,74 +48,72 @@ def test_a_rhythm_is_found_under_noise_on_a_slope_and_of_costs(seed, sign, slope
     found = peaks(moment, "go")
     assert np.abs(np.array(found) - [3, 11, 19, 27, 35]).max() <= 1
     what = "reward" if sign > 0 else "cost"
-    assert told(moment)[Rhythm].startswith(f"Before t+40 the {what} expected of go peaks every ")
-    assert told(moment)[Rhythm].endswith(f"from t+{found[0]} to t+{found[-1]}.")
+    said = told(moment)["rhythm"]
+    assert said.startswith(f"Within 40 steps the {what} expected after go peaks every ")
+    assert said.endswith(f"first in {found[0]} steps and last in {found[-1]} steps.")
 
 
-def test_a_period_is_told_in_seconds_of_play_too():
+def test_a_period_is_told_from_its_shortest_to_its_longest():
     said = told(learned(bumps(3, 11, 19, 27, 35), seconds_per_step=1 / 15))
-    assert "peaks every 8 steps (0.53 s), from t+3 to t+35." in said[Rhythm]
-    uneven = told(learned(bumps(3, 11, 20, 27, 35), seconds_per_step=1 / 15))
-    assert "peaks every 7 to 9 steps (0.47 to 0.6 s), from t+3 to t+35." in uneven[Rhythm]
+    assert "every 8 steps, first in 3 steps (0.2 s) and last in 35 steps" in said["rhythm"]
+    assert "every 7 to 9 steps" in told(learned(bumps(3, 11, 20, 27, 35)))["rhythm"]
 
 
 def test_what_comes_at_uneven_times_has_peaks_and_no_rhythm():
     said = told(learned(bumps(3, 9, 22, 32) + noise(0)))
-    assert Rhythm not in said
-    places = [int(place) for place in re.findall(r"t\+(\d+) \(", said[Peaks])]
-    assert places == [3, 9, 22, 32]
+    assert "rhythm" not in said
+    assert said["several-peaks"].endswith(
+        "peaks in 3 steps, in 9 steps, in 22 steps and in 32 steps."
+    )
 
 
 def test_three_peaks_are_a_rhythm_only_of_what_is_more_than_noise():
     row = bumps(3, 11, 19)
     off = np.full(41, 0.5) * TimeAxis(0.95, 40).discounts
-    assert Rhythm not in told(learned(row))
-    assert "every 8 steps" in told(learned(row, error=off))[Rhythm]
+    assert "rhythm" not in told(learned(row))
+    assert "every 8 steps" in told(learned(row, error=off))["rhythm"]
 
 
 def test_of_many_peaks_the_most_prominent_are_named():
     row = np.zeros(41)
     row[[2, 4, 11, 15, 17, 30]] = [1.0, 0.5, 0.9, 0.6, 0.8, 0.7]
-    worth = "t+2 (worth 0.90 now), t+11 (0.51), t+17 (0.33) and t+30 (0.15)"  # 0.95 ** t of each
-    assert told(learned(row))[Peaks].endswith(f"peaks most clearly at {worth}.")
+    assert told(learned(row))["several-peaks"].endswith(
+        "peaks in 2 steps, in 11 steps, in 17 steps and in 30 steps."
+    )
 
 
 def test_groups_are_counted_in_steps():
-    assert "every 24 steps" in told(learned(bumps(3, 11, 19, 27, 35), width=3))[Rhythm]
+    assert "every 24 steps" in told(learned(bumps(3, 11, 19, 27, 35), width=3))["rhythm"]
 
 
 def test_the_largest_is_that_without_the_discount():
     row = np.zeros(21)
     row[[2, 15]] = [1.0, 1.5]  # 0.90 and 0.69 now
     said = told(learned(row))
-    assert said[Peak].startswith(
-        "Before t+20 the largest reward to be expected of go is that of t+15"
+    assert said["peak"] == (
+        "The largest reward after go within 20 steps comes in 15 steps: it is worth 0.695 now."
     )
-    assert said[Peak].endswith("worth 0.69 now.")
 
 
 def test_a_reward_that_hardly_varies_has_no_peak_and_is_called_the_same():
     said = told(learned(1.0 + np.clip(noise(0, 0.01), -0.02, 0.02)))
     (first, *_) = said.values()
-    assert (
-        first
-        == "At each step before t+40 about the same reward is expected of go: 1.00 on average."
+    assert first.startswith("Each of the next 40 steps pays ")
+    assert first.endswith(" after go on average.")
+    assert not {"peak", "several-peaks", "rhythm", "spread"} & set(said)
+    assert told(learned(-np.ones(11)))["steady"] == (
+        "Each of the next 10 steps costs 1 after go on average."
     )
-    assert not {Peak, Peaks, Rhythm, Spread} & set(said)
-    assert (
-        "about the same cost is expected of go: -1 on average"
-        in told(learned(-np.ones(11)))[Steady]
-    )
-    assert Steady not in told(learned(1.0 + 0.2 * STEPS / 40.0))
+    assert "steady" not in told(learned(1.0 + 0.2 * STEPS / 40.0))
 
 
 def test_a_wide_peak_is_said_to_be_uncertain_or_drawn_out_but_not_of_what_is_exact():
     moment = learned(bumps(8, width=2.0))
     # half of its height is reached 2.35 steps away
-    assert "is spread over 5 steps, t+6 to t+10:" in told(moment)[Spread]
-    assert Spread not in told(learned(bumps(8, width=0.5)))
+    assert "in 8 steps is spread over 5 steps:" in told(moment)["spread"]
+    assert "spread" not in told(learned(bumps(8, width=0.5)))
     known = Moment(moment.decomposition, ("go",), moment.future, totals=np.array([5.0]))
-    assert Spread not in told(known)
+    assert "spread" not in told(known)
 
 
 def test_a_peak_is_not_told_of_what_rises_to_the_end_of_what_is_known():
@@ -153,7 +147,8 @@ def test_prominences_are_those_of_scipy():
 def test_a_circuit_pays_once_each_round(slip, width, said):
     world = Gridworld(load_map("loop").with_slip(slip))
     table = exact(world.mdp, TimeAxis(0.95, 48 // width, width))
-    explanation = explain(gridworld_moment(world, table, 0), "right")
-    (rhythm,) = (x for x in explanation.forecast if type(x) is Rhythm)
-    assert rhythm.period[0] == 14  # cells in a round; who slips takes longer
-    assert f"peaks every {said} steps" in sentence(rhythm, explanation)
+    (rhythm,) = (
+        c for c in forecast(gridworld_moment(world, table, 0).choice("right")) if c.kind == "rhythm"
+    )
+    assert rhythm.period == said  # cells in a round; who slips takes longer
+    assert f"peaks every {said} steps" in rhythm.sentence

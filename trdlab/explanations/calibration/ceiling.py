@@ -7,11 +7,9 @@ import numpy as np
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.intervals import LEVEL, RESAMPLES, Estimates, by_episode
 from trdlab.rollouts.branches import Branches
 from trdlab.rollouts.realised import per_episode
-from trdlab.tabular import ExactTable
-from trdlab.tabular.uncertainty import spread
+from trdlab.statistics import Estimates, by_episode
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +21,8 @@ class Ceiling:
         skill: `[N+1]`; NaN where it is not known, or where nothing varies.
         num_moments: how many moments were continued from copies.
         copies: n, how often each was.
-        deterministic: whether it is known what followed, and no two copies of a moment ever
-            differed: then the ceiling is 1, if the chance of the environment is copied as it
-            should be.
+        deterministic: whether different things followed different moments, and the same followed
+            all copies of each: then the ceiling is 1, if chance is not shared by copies.
     """
 
     time_axis: TimeAxis
@@ -35,9 +32,7 @@ class Ceiling:
     deterministic: bool
 
 
-def ceiling(
-    branches: Branches, *, seed: int = 0, level: float = LEVEL, resamples: int = RESAMPLES
-) -> Ceiling:
+def ceiling_of(branches: Branches, *, seed: int = 0) -> Ceiling:
     """Estimates the skill of a perfect prediction from what followed copies of the same states.
 
     A perfect prediction is the mean μ of what follows, so its skill is Var(μ) / (Var(μ) + σ²) with
@@ -49,8 +44,6 @@ def ceiling(
     Args:
         branches: moments of whole episodes, as `Branching.along` draws them.
         seed: of the bootstrap, which is by episode.
-        level: the probability that the interval is made for.
-        resamples: how many samples of episodes are drawn.
 
     Raises:
         InputError: there is only one copy of each moment, or only one moment.
@@ -79,28 +72,11 @@ def ceiling(
         whole = between + noise * (1.0 - 1.0 / n)
         return np.where(whole > 1e-12 * scale, 1.0 - noise / whole, np.nan)
 
-    rng = np.random.default_rng(seed)
     return Ceiling(
         time_axis=branches.time_axis,
-        skill=by_episode(sums, skill, rng=rng, level=level, resamples=resamples),
+        skill=by_episode(sums, skill, seed=seed),
         num_moments=len(branches.actions),
         copies=n,
         # a variance may have rounding errors
-        deterministic=bool(known.any() and not np.ptp(observed, axis=1).any()),
+        deterministic=bool(np.ptp(observed, axis=0).any() and not np.ptp(observed, axis=1).any()),
     )
-
-
-def exact_ceiling(table: ExactTable, visits: FloatArray) -> FloatArray:
-    """Returns `[N+1]`: the skill of a perfect prediction in an exact model.
-
-    Args:
-        table: the model, solved; its own skill is the ceiling.
-        visits: `[S, A]`, how often each action is taken in each state (any unit).
-    """
-    weights = (visits / visits.sum())[..., None]  # [S, A, 1]
-    components = table.decomposition.components
-    mean = (weights * components).sum(axis=(0, 1))
-    between = (weights * (components - mean) ** 2).sum(axis=(0, 1))
-    within = (weights * spread(table).variance).sum(axis=(0, 1))
-    with np.errstate(invalid="ignore"):  # 0/0 where nothing varies
-        return np.asarray(between / (between + within))

@@ -1,31 +1,22 @@
-"""The Bellman-shift audit: do the components of one step fit those of the next?"""
+"""Consistency: do the components of one step fit those of the next?"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.arrays import RELATIVE_ZERO, BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.intervals import (
-    LEVEL,
-    RESAMPLES,
-    Estimates,
-    draws,
-    has_enough,
-    percentiles,
-    pooled,
-)
 from trdlab.rollouts.episodes import Episode
 from trdlab.rollouts.realised import common_axis, next_flag
-from trdlab.statistics import Estimate
+from trdlab.statistics import Estimate, Estimates, draws, has_enough, percentiles, pooled
 
 NUM_AGES = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Audit:
+class Consistency:
     """How the components of one step follow from those of w steps later.
 
     By the law component i ≥ 1 is γ^w times component i−1 of the next state, on average, and
@@ -61,13 +52,7 @@ class Audit:
     past_reset: Estimate
 
 
-def audit(
-    episodes: Sequence[Episode],
-    *,
-    seed: int = 0,
-    level: float = LEVEL,
-    resamples: int = RESAMPLES,
-) -> Audit:
+def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency:
     """Compares the components of steps t and t+w with each other; no reward is looked at.
 
     With n the components of the action taken at t, n′ those expected at t+w, g = 1 where the
@@ -82,8 +67,6 @@ def audit(
     Args:
         episodes: what was predicted and what happened; all of one time axis.
         seed: of the bootstrap, which is by episode.
-        level: the probability that the intervals are made for.
-        resamples: how many samples of episodes are drawn.
 
     Raises:
         InputError: there are no episodes, or of different time axes; there are no components to
@@ -100,19 +83,21 @@ def audit(
     edges = np.unique(np.quantile(ages, np.arange(1, NUM_AGES) / NUM_AGES, method="higher"))
     first = _shifted(np.mean([episode.expected[0] for episode in episodes], axis=0))  # [N]
     sums = np.stack([of.sums(edges, first) for of in pairs])  # [E, 5, ages, N]
-    drawn = draws(len(sums), resamples, np.random.default_rng(seed))  # [1 + R, E]
+    scale = max(float(np.abs(of.decomposition.components).max()) for of in episodes)
+    sums[:, 1:] *= np.abs(sums[:, 1:]) > RELATIVE_ZERO * scale  # the rest is rounding
+    drawn = draws(len(sums), seed)  # [1 + R, E]
     discount = axis.gamma**axis.width
     count, before, after = pooled(drawn, sums[:, :3].sum(axis=2)).transpose(1, 0, 2)
     gap = (before - discount * after) / np.maximum(count, 1.0)  # [1 + R, N]
     enough, mass = has_enough(sums), np.abs(before[0]).cumsum()  # [N]
     near = np.arange(axis.horizon) <= (mass >= mass[-1] / 2.0).argmax()
     fitted = _fitted(drawn, sums[:, 1:], discount)
-    estimates = percentiles(fitted, level, enough)
-    return Audit(
+    estimates = percentiles(fitted, enough)
+    return Consistency(
         time_axis=axis,
         num_transitions=len(ages),
         num_ends=sum(int((~of.goes_on).sum()) for of in pairs),
-        gap=percentiles(gap, level, enough),
+        gap=percentiles(gap, enough),
         discount=estimates[0],
         discount_near=_fitted(drawn[:1], sums[:, 1:, :, near], discount)[0, 0],
         discount_far=_fitted(drawn[:1], sums[:, 1:, :, ~near], discount)[0, 0],
@@ -172,7 +157,7 @@ def _shifted(components: FloatArray) -> FloatArray:
 def _fitted(drawn: FloatArray, sums: FloatArray, discount: float) -> FloatArray:
     """Returns `[1 + R, 4]`: d, (b + c)/γ^w, c/γ^w and the share that they explain.
 
-    They are fitted to sums `[E, 4, ages, n]` as `audit` describes it. Products are taken between
+    They are fitted to sums `[E, 4, ages, n]` as `consistency_of` says. Products are taken between
     different episodes only, where chance is independent: that of what follows would otherwise make
     d too small.
     """

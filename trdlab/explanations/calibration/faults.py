@@ -1,91 +1,186 @@
-"""Faults: what an implementation got wrong, named from the numbers of blame and audit."""
+"""Faults: what is wrong with a forecast, where the data tell it from the alternatives."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
 
-from trdlab.explanations.calibration.consistency import Audit
-from trdlab.explanations.calibration.errors import Blame
+import numpy as np
+
+from trdlab.explanations.calibration.consistency import Consistency
+from trdlab.explanations.calibration.errors import LEAST_SMEAR, is_off
+from trdlab.explanations.calibration.errors import SLACK as AMOUNT
+from trdlab.explanations.calibration.report import CalibrationReport
+from trdlab.explanations.rules import Claim, Fields, Language, every, first
+from trdlab.explanations.words import forms_of
 from trdlab.statistics import Estimate
 
 EXPLAINED = 0.95
+"""The share of the components that must fit what follows, for a fault between them to be named."""
 SLACK = 0.2
 """How far the exponent of a discount may be from w, as a share of w, before it is a fault."""
 
+_ROUNDING = 1e-9  # relative to the largest component
 
-@dataclass(frozen=True)
-class ShiftedReward:
-    """Rewards are counted some components too late, or too early if negative."""
+REPORTS = Language[CalibrationReport](
+    "this report", lambda report: forms_of(report.time_axis, report.seconds_per_step)
+)
+rule = REPORTS.rule
 
-    components: int
-    agreement: float
-
-
-@dataclass(frozen=True)
-class WrongDiscount:
-    """Components are not multiplied by γ^w from one to the next, but by something else."""
-
-    expected: float
-    measured: Estimate
-    exponent: Estimate
+# ---- timing and amount ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class IgnoredEnd:
-    """What is expected after the end of an episode counts although it ended."""
-
-    share: Estimate
-    resets: bool
+@rule("It expects rewards {steps:steps} too late.")
+def too_late(report: CalibrationReport) -> Iterator[Fields]:
+    if report.errors is not None and report.errors.shift > 0:
+        yield {"steps": report.errors.shift * report.time_axis.width}
 
 
-Fault = ShiftedReward | WrongDiscount | IgnoredEnd
+@rule("It expects rewards {steps:steps} too early.")
+def too_early(report: CalibrationReport) -> Iterator[Fields]:
+    if report.errors is not None and report.errors.shift < 0:
+        yield {"steps": -report.errors.shift * report.time_axis.width}
 
 
-def diagnose(blame: Blame | None, audit: Audit | None) -> tuple[Fault, ...]:
-    """Returns the faults that the numbers are sure of; none of them where there is doubt.
+@rule("All in all it expects {times:number} times as much as comes {span:span}.")
+def too_much(report: CalibrationReport) -> Iterator[Fields]:
+    if (
+        report.errors is not None
+        and report.errors.amount.low > 1.0
+        and is_off(report.errors.amount)
+    ):
+        yield _explicit(report) | {"times": report.errors.amount.value}
 
-    - A reward is shifted if the blame is (see `AGREEMENT`).
 
-    The others are named only if hardly anything else is wrong between components, which is so if
-    `EXPLAINED` of them fits what follows.
+@rule("All in all it expects {share:percent} of what comes {span:span}.")
+def too_little(report: CalibrationReport) -> Iterator[Fields]:
+    if (
+        report.errors is not None
+        and report.errors.amount.high < 1.0
+        and is_off(report.errors.amount)
+    ):
+        yield _explicit(report) | {"share": report.errors.amount.value}
 
+
+@rule(
+    "It expects {amount:text} of what comes {span:span}: {said:number} on average, where "
+    "{came:number} came."
+)
+def off_from(report: CalibrationReport) -> Iterator[Fields]:
+    """Near components are not surely off by a tenth; all others are, to the same side."""
+    if report.errors is None or report.errors.shift or not is_off(report.errors.amount):
+        return
+    told, explicit = report.calibration, report.time_axis.horizon
+    tested = np.flatnonzero(~told.is_("not tested")[:explicit])
+    bias, much = told.bias, np.abs(told.bias.value) > AMOUNT * np.abs(told.mean)
+    sides = np.where((bias.low > 0.0) & much, 1, np.where((bias.high < 0.0) & much, -1, 0))
+    end = int(tested[-1]) + 1 if tested.size else 0
+    begin = end - int(np.append(sides[:end][::-1] != sides[end - 1], True).argmax())
+    if 0 < begin < end and sides[end - 1] and not sides[:begin].any():
+        came = float(told.mean[begin:end].sum())
+        said = came + float(told.bias.value[begin:end].sum())
+        amount = "too much" if abs(said) > abs(came) else "too little"
+        yield {"span": (begin, end - 1), "said": said, "came": came, "amount": amount}
+
+
+@rule("It spreads rewards over the steps before and after, more than their timing is uncertain.")
+def smeared(report: CalibrationReport) -> Iterator[Fields]:
+    found = report.errors
+    if found is not None and found.smear.low > LEAST_SMEAR and not found.shift:
+        yield {"smear": report.errors.smear}
+
+
+@rule(
+    "It expects up to {said:number}: too much, for at most {most:number} can come if no step pays "
+    "more than {reward:number}, the most seen."
+)
+def overestimates(report: CalibrationReport) -> Iterator[Fields]:
+    reward, said = report.judged.most, float(report.calibration.predicted_range[1, -1])
+    most = max(reward, 0.0) / (1.0 - report.time_axis.gamma)
+    if said > most + _ROUNDING * report.scale:
+        yield {"said": said, "most": most, "reward": reward}
+
+
+@rule(
+    "It expects as little as {said:number}: too little, for at least {least:number} comes if no "
+    "step pays less than {reward:number}, the least seen."
+)
+def underestimates(report: CalibrationReport) -> Iterator[Fields]:
+    reward, said = report.judged.least, float(report.calibration.predicted_range[0, -1])
+    least = min(reward, 0.0) / (1.0 - report.time_axis.gamma)
+    if said < least - _ROUNDING * report.scale:
+        yield {"said": said, "least": least, "reward": reward}
+
+
+# ---- between one step and the next ---------------------------------------------------------------
+
+
+@rule(
+    "It discounts what comes {width:steps} later by {measured:number}, and not by {right:number}."
+)
+def discount_off(report: CalibrationReport) -> Iterator[Fields]:
+    axis = report.time_axis
+    if report.consistency is not None and is_discount_wrong(report.consistency):
+        measured, right = report.consistency.discount.value, axis.gamma**axis.width
+        yield {"width": axis.width, "measured": measured, "right": right}
+
+
+@rule(
+    "It ignores where episodes end: it counts in {share:percent} of what the start of the next one "
+    "promises."
+)
+def goes_on_in_next(report: CalibrationReport) -> Iterator[Fields]:
+    found = report.consistency
+    if found is not None and is_end_ignored(found) and found.past_reset.low > 0.5:
+        yield {"share": found.past_end.value}
+
+
+@rule("It ignores where episodes end: it counts in {share:percent} of what it expects after that.")
+def goes_on_after_end(report: CalibrationReport) -> Iterator[Fields]:
+    if report.consistency is not None and is_end_ignored(report.consistency):
+        yield {"share": report.consistency.past_end.value}
+
+
+def faults(report: CalibrationReport) -> list[Claim]:
+    """Returns what an implementation got wrong; nothing where there is doubt.
+
+    - Rewards are expected too early, or too late, if other components fit surely better.
     - The discount is wrong if x, where components are really multiplied by γ^x from one to the
       next, is surely more than a fifth of w away from w, and on the same side for near components
       and for far ones: else something is wrong, but not the discount. At w = 2, a forgotten power
       gives 1.
     - An end is ignored if surely more than half of what is expected after it counts.
+
+    The last two are named only if hardly anything else is wrong between components, which is so if
+    `EXPLAINED` of them fits what follows.
+
+    Args:
+        report: on the forecasts.
     """
-    faults: list[Fault] = []
-    if blame is not None and blame.shift:
-        faults.append(ShiftedReward(blame.shift, blame.agreement))
-    if audit is not None:
-        if is_discount_wrong(audit):
-            expected = audit.time_axis.gamma**audit.time_axis.width
-            faults.append(WrongDiscount(expected, audit.discount, discount_exponent(audit)))
-        if is_end_ignored(audit):
-            faults.append(IgnoredEnd(audit.past_end, audit.past_reset.low > 0.5))
-    return tuple(faults)
+    return [
+        *every(report, too_late, too_early, discount_off),
+        *first(report, goes_on_in_next, goes_on_after_end),
+    ]
 
 
-def is_discount_wrong(audit: Audit) -> bool:
-    """Returns whether the discount is surely wrong (see `diagnose`)."""
-    all_of_them, gamma = discount_exponent(audit), audit.time_axis.gamma
-    near, far = (_exponent(of, gamma) for of in (audit.discount_near, audit.discount_far))
-    least, most = ((1.0 + sign * SLACK) * audit.time_axis.width for sign in (-1.0, 1.0))
-    if not audit.explained >= EXPLAINED:
+def is_discount_wrong(found: Consistency) -> bool:
+    """Returns whether the discount is surely wrong (see `faults`)."""
+    all_of_them, gamma = discount_exponent(found), found.time_axis.gamma
+    near, far = (_exponent(of, gamma) for of in (found.discount_near, found.discount_far))
+    least, most = ((1.0 + sign * SLACK) * found.time_axis.width for sign in (-1.0, 1.0))
+    if not found.explained >= EXPLAINED:
         return False
     parts = [part for part in (near, far) if not math.isnan(part)]
     below = all_of_them.high < least and all(part < least for part in parts)
     return below or (all_of_them.low > most and all(part > most for part in parts))
 
 
-def is_end_ignored(audit: Audit) -> bool:
-    """Returns whether what is expected after an end surely counts (see `diagnose`)."""
-    return audit.explained >= EXPLAINED and audit.past_end.low > 0.5
+def is_end_ignored(found: Consistency) -> bool:
+    """Returns whether what is expected after an end surely counts (see `faults`)."""
+    return found.explained >= EXPLAINED and found.past_end.low > 0.5
 
 
-def discount_exponent(audit: Audit) -> Estimate:
+def discount_exponent(found: Consistency) -> Estimate:
     """Returns x, where components are multiplied by γ^x from one to the next; w if all is well."""
-    of, gamma = audit.discount, audit.time_axis.gamma
+    of, gamma = found.discount, found.time_axis.gamma
     return Estimate(*(_exponent(discount, gamma) for discount in (of.value, of.high, of.low)))
 
 
@@ -93,3 +188,7 @@ def _exponent(discount: float, gamma: float) -> float:
     if math.isnan(discount) or gamma == 0.0:
         return math.nan
     return math.log(discount) / math.log(gamma) if discount > 0.0 else math.inf
+
+
+def _explicit(report: CalibrationReport) -> Fields:
+    return {"span": (0, report.time_axis.horizon - 1)}

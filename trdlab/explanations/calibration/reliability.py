@@ -31,7 +31,7 @@ class Reliability:
     observed: FloatArray
 
 
-def reliability(samples: Samples) -> Reliability | None:
+def reliability_of(samples: Samples) -> Reliability | None:
     """Returns the reliability of every explicit component, None where it is not defined.
 
     It is defined for w = 1 and γ > 0, where every observed reward is 0 or one and the same amount.

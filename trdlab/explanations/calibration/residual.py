@@ -7,18 +7,16 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.intervals import LEVEL, RESAMPLES, by_episode
 from trdlab.rollouts.episodes import Episode
 from trdlab.rollouts.realised import common_axis
-from trdlab.statistics import Estimate
-from trdlab.tabular import ExactTable, exact
+from trdlab.statistics import Estimate, by_episode
 
 SHARE = 0.05
 """The share of the reward that may lie in the residual of an N that suffices."""
 
 
 @dataclass(frozen=True, eq=False)
-class Hidden:
+class Residual:
     """The share of rewards that is predicted, but not when.
 
     Shares are of absolute values, so that gains and costs do not cancel.
@@ -28,8 +26,6 @@ class Hidden:
         value: the share of the components of the actions taken that is in the residual.
         gap: the same of the difference between the best action and the next best; NaN where
             actions never differ.
-        tails: `[N+1]`, the share of the predicted components from each one on; the last of them
-            is `value`.
         observed_tails: `[L]`, the share of the discounted rewards that came 0, 1, … steps later or
             after that; empty if no reward came, or some episode was cut off.
     """
@@ -37,7 +33,6 @@ class Hidden:
     time_axis: TimeAxis
     value: Estimate
     gap: Estimate
-    tails: FloatArray
     observed_tails: FloatArray
 
     def sufficient(self, share: float = SHARE) -> int | None:
@@ -45,76 +40,33 @@ class Hidden:
 
         It is read off the rewards that were observed; None where too few were.
         """
-        return sufficient_horizon(self.observed_tails, self.time_axis.width, share)
+        enough = np.flatnonzero(self.observed_tails <= share)
+        return -(-int(enough[0]) // self.time_axis.width) if enough.size else None
 
 
-def hidden(
-    episodes: Sequence[Episode],
-    *,
-    seed: int = 0,
-    level: float = LEVEL,
-    resamples: int = RESAMPLES,
-) -> Hidden:
+def residual_of(episodes: Sequence[Episode], *, seed: int = 0) -> Residual:
     """Returns how much of values, and of the differences between actions, is in the residual.
 
     Args:
         episodes: what was predicted and what happened; all of one time axis.
         seed: of the bootstrap, which is by episode.
-        level: the probability that the intervals are made for.
-        resamples: how many samples of episodes are drawn.
 
     Raises:
         InputError: there are no episodes, or they are of different time axes.
     """
-    axis, rng = common_axis(episodes), np.random.default_rng(seed)
+    axis = common_axis(episodes)
     sums = np.stack([[np.abs(of).sum(axis=0) for of in (e.predicted, _gaps(e))] for e in episodes])
     shares = by_episode(
         sums.astype(np.float64),  # [E, 2, N+1]
         lambda pooled: pooled[..., -1] / pooled.sum(axis=-1),
-        rng=rng,
-        level=level,
-        resamples=resamples,
+        seed=seed,
     )
-    predicted = sums[:, 0].sum(axis=0)
-    return Hidden(
+    return Residual(
         time_axis=axis,
         value=shares[0],
         gap=shares[1],
-        tails=_tails(predicted),
         observed_tails=_observed_tails(episodes, axis.gamma),
     )
-
-
-def exact_tails(table: ExactTable, visits: FloatArray, steps: int) -> FloatArray:
-    """Returns `[steps + 1]`: the share of the discounted rewards that comes each step or later.
-
-    Args:
-        table: an exact model and its policy.
-        visits: `[S, A]`, how often each action is taken in each state (any unit).
-        steps: how far to look.
-    """
-    magnitudes = table.mdp.with_rewards(np.abs(table.mdp.rewards))
-    axis = TimeAxis(table.time_axis.gamma, steps)
-    components = exact(magnitudes, axis, policy=table.solution.policy).decomposition.components
-    return _tails(np.einsum("sa,san->n", visits, components))
-
-
-def sufficient_horizon(tails: FloatArray, width: int = 1, share: float = SHARE) -> int | None:
-    """Returns the least N at which components of w steps leave no more than a share to come.
-
-    Args:
-        tails: `[L]`, the share of the reward that comes 0, 1, … steps later or after that.
-        width: w.
-        share: of the reward that may be in the residual.
-
-    Returns:
-        N; None where the tails do not reach that far down.
-
-    >>> sufficient_horizon(np.array([1.0, 0.5, 0.2, 0.04]), width=2)
-    2
-    """
-    enough = np.flatnonzero(tails <= share)
-    return -(-int(enough[0]) // width) if enough.size else None
 
 
 def _gaps(episode: Episode) -> FloatArray:
@@ -125,12 +77,6 @@ def _gaps(episode: Episode) -> FloatArray:
     order = np.argsort(-episode.decomposition.value, axis=1, kind="stable")[:, :2, None]
     best, second = np.moveaxis(np.take_along_axis(components, order, axis=1), 1, 0)
     return np.asarray(best - second)
-
-
-def _tails(sums: FloatArray) -> FloatArray:
-    """Returns the share of `sums [n]` from each entry on; NaN where they are all zero."""
-    tails = np.cumsum(sums[::-1])[::-1]
-    return np.asarray(tails / tails[0] if tails[0] else np.full(len(sums), np.nan))
 
 
 def _observed_tails(episodes: Sequence[Episode], gamma: float) -> FloatArray:

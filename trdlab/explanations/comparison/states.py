@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from trdlab.agents.agent import Agent
 from trdlab.arrays import FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
-from trdlab.rollouts.playing import Decision, Playing, Progress, Watch, decide, unwatched
+from trdlab.policies import acting, ask, greedy
+from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
 
 _ROUNDING = 1e-9  # of the largest component; what differs by less is the same
 _BATCH = 256
@@ -120,15 +121,15 @@ def visit(
     """
     rng, different, cut = np.random.default_rng(seed), set(), 0
     kept = _Kept(most_states // 2), _Kept(most_states // 2)
-    for player, agent in enumerate(players):
+    for player in range(2):
         for own in range(seed, seed + episodes):
             done, phase = player * episodes + own - seed, int(rng.integers(_PHASES))
             told = blake2b()
-            for step, observation, happened, is_cut in _played(agent, own, max_steps):
-                kept[player].offer(phase + step, _Seen(player, own, step, observation))
-                told.update(observation.tobytes() + happened)
+            for seen, happened, is_cut in _played(players, player, own, max_steps):
+                kept[player].offer(phase + seen.step, seen)
+                told.update(seen.observation.tobytes() + happened)
                 cut += is_cut
-                watch(Progress("episodes to compare at", done, 2 * episodes, step))
+                watch(Progress("episodes to compare at", done, 2 * episodes, seen.step))
             different.add(told.digest())
     count = min(len(of.found) for of in kept)
     found = [item for of in kept for item in of.evenly(count)]
@@ -137,12 +138,22 @@ def visit(
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """An observation, and where it was made."""
+    """An observation, where it was made, and what the two would do there.
+
+    Args:
+        player: in whose episode.
+        seed: of that episode.
+        step: of that episode.
+        observation: `[...]`.
+        probabilities: of each of the two, `[1, A]`; None of an onlooker who acts greedily, whom one
+            can ask later.
+    """
 
     player: int
     seed: int
     step: int
-    observation: Any
+    observation: NDArray[Any]
+    probabilities: tuple[FloatArray | None, FloatArray | None]
 
 
 class _Kept:
@@ -166,38 +177,44 @@ class _Kept:
 
 
 def _played(
-    agent: Agent, seed: int, max_steps: int | None
-) -> Iterator[tuple[int, NDArray[Any], bytes, bool]]:
-    """Plays one episode just as `Agent.moment` does, so that it can show each of its steps.
+    players: tuple[Agent, Agent], player: int, seed: int, max_steps: int | None
+) -> Iterator[tuple[_Seen, bytes, bool]]:
+    """Plays one episode just as it is explained, so that each of its steps can be.
+
+    Each of the two is asked at every step, for either may remember what came before.
 
     Args:
-        agent: who plays.
+        players: the two.
+        player: 0 or 1, who of them acts.
         seed: of the episode.
         max_steps: after which it is cut off.
 
     Yields:
-        The number of each step, what was seen there, what was done and paid, and whether more could
-        have come of an episode that is not played on.
+        What was seen at each step, what was done and paid, and whether more could have come of an
+        episode that is not played on.
     """
-    environments, rng = agent.make(1, seed), np.random.default_rng(seed)
+    agent, other = players[player], players[1 - player].policy
+    environments, rng, memory = agent.make(1, seed), np.random.default_rng(seed), None
     try:
-        playing = Playing(
-            agent.estimator, environments, rng, policy=agent.policy, max_steps=max_steps
-        )
+        policy = acting(agent.policy or agent.estimator)
+        playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
         while playing.running[0]:
-            at, observation = playing.steps, np.array(playing.stack.observations[0])
-            _, actions = playing.decide()
-            step = playing.take(actions)
+            at, observation = playing.steps, np.array(playing.stack.observations)  # [1, ...]
+            turn, likely = playing.turn(), None
+            if other is not None:
+                likely, memory = ask(other, observation, memory, np.array([at == 0]))
+            told = (turn.probabilities, likely)  # [1, A] each
+            seen = _Seen(player, seed, at, observation[0], told if player == 0 else told[::-1])
+            step = playing.take(turn.actions)
             is_cut = bool(playing.finished[0] and not step.ended[0])
-            yield at, observation, actions.tobytes() + step.rewards.tobytes(), is_cut
+            yield seen, turn.actions.tobytes() + step.rewards.tobytes(), is_cut
     finally:
         environments.close()
 
 
 def _visits(players: tuple[Agent, Agent], found: Sequence[_Seen], different: int) -> Visits:
-    observations = [seen.observation for seen in found]
     axis = players[0].estimator.time_axis.shared(players[1].estimator.time_axis)
-    told = [_decided(agent, observations, axis) for agent in players]
+    told = [_decided(agent, i, found, axis) for i, agent in enumerate(players)]
     return Visits(
         time_axis=axis,
         components=np.stack([components for components, _ in told]),
@@ -210,16 +227,18 @@ def _visits(players: tuple[Agent, Agent], found: Sequence[_Seen], different: int
 
 
 def _decided(
-    agent: Agent, observations: Sequence[Any], axis: TimeAxis
+    agent: Agent, number: int, found: Sequence[_Seen], axis: TimeAxis
 ) -> tuple[FloatArray, FloatArray]:
     """Returns components `[M, A, N+1]` on an axis, and probabilities `[M, A]`."""
-    batches: list[Decision] = [
-        decide(agent.estimator, np.stack(observations[i : i + _BATCH]), agent.policy)
-        for i in range(0, len(observations), _BATCH)
+    batches = [
+        agent.estimator.decompose(np.stack([seen.observation for seen in found[i : i + _BATCH]]))
+        for i in range(0, len(found), _BATCH)
     ]
-    components = [batch.decomposition.on(axis).components for batch in batches]
-    probabilities = [batch.probabilities for batch in batches]
-    return (
-        np.concatenate(components).astype(np.float64),
-        np.concatenate(probabilities).astype(np.float64),
+    told = [seen.probabilities[number] for seen in found]
+    likely = (
+        np.concatenate([greedy(batch.value) for batch in batches])
+        if agent.policy is None
+        else np.concatenate([row for row in told if row is not None])
     )
+    components = np.concatenate([batch.on(axis).components for batch in batches])
+    return components.astype(np.float64), likely.astype(np.float64)

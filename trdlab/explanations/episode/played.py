@@ -1,12 +1,15 @@
-"""An episode that was played, and the family of claims about one."""
+"""An episode that was played, and how what is said of one looks."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from trdlab.agents.agent import Agent
-from trdlab.explanations.claims import Claim
 from trdlab.explanations.episode.revision import Revision, revise
+from trdlab.explanations.rules import Form, Language
+from trdlab.explanations.words import forms_of
+from trdlab.formatting import said
 from trdlab.rollouts.episodes import Episode
 
 
@@ -47,17 +50,30 @@ class Played:
         return place if place < len(steps) and steps[place] == step else None
 
 
-class StoryClaim(Claim):
-    """A claim about an episode that was played."""
+def _forms(played: Played) -> dict[str, Form]:
+    axis = played.episode.time_axis
+    plural = axis.width > 1
+    return forms_of(axis, played.seconds_per_step) | {
+        "rewards": Form(lambda worth, digits: _named(worth, digits, plural=True), abs),
+        "paid": Form(lambda paid, digits: _named(paid, digits, plural=plural), abs),
+        "bound": Form(lambda most, _: said(_rounded_up(most))),
+    }
 
-    @property
-    def place(self) -> int | None:
-        """The step of the episode that it is about; None if it is about the whole."""
-        return None
 
-    def holds(self, played: Played) -> bool:
-        """Returns whether the claim is true of an episode, tested by its definition."""
-        raise NotImplementedError
+def _named(value: float, digits: int, *, plural: bool) -> str:
+    """Returns a reward or a cost, or the worth of several."""
+    kind, size = "reward" if value >= 0.0 else "cost", said(abs(value), digits)
+    return f"{kind}s worth {size}" if plural else f"a {kind} of {size}"
+
+
+def _rounded_up(value: float) -> float:
+    """Returns a number of three digits that is no smaller."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.ceil(value / unit - 1e-9) * unit
+
+
+EPISODES = Language[Played]("this episode", _forms)
+"""What there is to say of an episode."""
 
 
 def play(agent: Agent, seed: int = 0, *, max_steps: int | None = None) -> Played:

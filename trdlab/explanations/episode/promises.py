@@ -1,4 +1,4 @@
-"""Claims about rewards that came as foreseen, and about promises that were not kept."""
+"""Rewards that came as foreseen, and promises that were not kept."""
 
 from collections.abc import Iterator
 from itertools import groupby
@@ -6,8 +6,8 @@ from itertools import groupby
 import numpy as np
 
 from trdlab.arrays import IntArray
-from trdlab.explanations.claims import agrees
-from trdlab.explanations.episode.played import Played, StoryClaim
+from trdlab.explanations.episode.played import EPISODES, Played
+from trdlab.explanations.rules import Claim, Fields, every
 from trdlab.rollouts.episodes import Episode
 from trdlab.rollouts.realised import next_flag
 
@@ -19,47 +19,55 @@ SMALLEST_DISCOUNT = 1e-6
 """A discount smaller than this is not taken out of a component."""
 
 
-# ---- rewards that came as foreseen ---------------------------------------------------------------
+# ---- rewards that came as foreseen -------------------------------------------------------------
 
 
-class _Foreseen(StoryClaim):
-    """At least half of a reward was expected of the right component, for so many steps on end.
+def foreseen(played: Played) -> list[Claim]:
+    """Returns the rewards that were foreseen, largest first, of equals the longest foreseen first.
+
+    There is none where the reward was always the same: then nothing had to be foreseen.
+    """
+    claims = every(played, foreseen_fully, foreseen_before)
+    return sorted(claims, key=lambda claim: (-abs(claim.reward), -claim.steps, claim.step))
+
+
+def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: object) -> bool:
+    """Returns whether half of a reward was expected of the right component for so many steps.
 
     The right component of j steps before is the one that covers the step t + j. None is expected
-    across an end, nor of the residual.
+    across an end, nor of the residual. At the step before these it was not, or could not be.
     """
-
-    reward: float
-    step: int
-    steps: int
-
-    @property
-    def place(self) -> int:
-        return self.step
-
-    def _is_foreseen(self, played: Played, *, fully: bool) -> bool:
-        episode, step = played.episode, self.step
-        if not (0 <= step < len(episode) and agrees(self.reward, episode.rewards[step])):
-            return False
-        steps = 0
-        while _can_tell(episode, step, steps) and _tells(episode, step, steps):
-            steps += 1
-        is_all = not _can_tell(episode, step, steps)
-        return self.steps == steps - 1 >= 1 and is_all == fully
+    episode, told = played.episode, range(steps + 1)
+    is_told = all(_can_tell(episode, step, j) and _tells(episode, step, j) for j in told)
+    could = _can_tell(episode, step, steps + 1)
+    return is_told and not (could and _tells(episode, step, steps + 1))
 
 
-class Foreseen(_Foreseen):
-    """It was not foreseen any earlier, although it could have been."""
-
-    def holds(self, played: Played) -> bool:
-        return self._is_foreseen(played, fully=False)
-
-
-class ForeseenFully(_Foreseen):
+@EPISODES.rule(
+    "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as it could be.",
+    holds=_is_foreseen,
+)
+def foreseen_fully(played: Played) -> Iterator[Fields]:
     """It was foreseen since the future began, or as far ahead as there are explicit components."""
+    yield from (fields for fields in _foreseen(played) if fields["steps"] == fields["limit"])
 
-    def holds(self, played: Played) -> bool:
-        return self._is_foreseen(played, fully=True)
+
+@EPISODES.rule(
+    "{reward:paid} at {step:step} was foreseen {steps:steps} before.", holds=_is_foreseen
+)
+def foreseen_before(played: Played) -> Iterator[Fields]:
+    """It was not foreseen any earlier, although it could have been."""
+    yield from (fields for fields in _foreseen(played) if fields["steps"] < fields["limit"])
+
+
+def _foreseen(played: Played) -> Iterator[Fields]:
+    episode, rewards = played.episode, played.episode.rewards
+    if np.ptp(rewards) == 0.0:
+        return
+    steps, limit = _foreseen_steps(episode)  # [T] each
+    for at in np.flatnonzero((steps >= 1) & (rewards != 0.0)).tolist():
+        told = {"reward": float(rewards[at]), "step": at, "steps": int(steps[at])}
+        yield told | {"limit": int(limit[at])}
 
 
 def _can_tell(episode: Episode, step: int, ahead: int) -> bool:
@@ -74,25 +82,6 @@ def _tells(episode: Episode, step: int, ahead: int) -> bool:
     axis, reward = episode.time_axis, episode.rewards[step]
     expected = episode.predicted[step - ahead, ahead // axis.width] * np.sign(reward)
     return bool(expected > 0.0 and expected >= HALF * abs(reward) * axis.gamma**ahead)
-
-
-def foreseen(played: Played) -> tuple[Foreseen | ForeseenFully, ...]:
-    """Returns the rewards that were foreseen, largest first, of equals the longest foreseen first.
-
-    There is none where the reward was always the same: then nothing had to be foreseen.
-    """
-    episode, rewards = played.episode, played.episode.rewards
-    if np.ptp(rewards) == 0.0:
-        return ()
-    steps, limit = _foreseen_steps(episode)  # [T] each
-    known = np.flatnonzero((steps >= 1) & (rewards != 0.0))
-    order = known[np.lexsort((-steps[known], -np.abs(rewards[known])))]
-    return tuple(
-        (ForeseenFully if steps[at] == limit[at] else Foreseen)(
-            float(rewards[at]), int(at), int(steps[at])
-        )
-        for at in order
-    )
 
 
 def _foreseen_steps(episode: Episode) -> tuple[IntArray, IntArray]:
@@ -115,78 +104,80 @@ def _foreseen_steps(episode: Episode) -> tuple[IntArray, IntArray]:
     return steps, limit
 
 
-# ---- promises that were not kept -----------------------------------------------------------------
+# ---- promises that were not kept ---------------------------------------------------------------
 
 
-class _Broken(StoryClaim):
-    """A reward stayed k components away from a step to another one, and did not come by then.
+def broken_promises(played: Played) -> list[Claim]:
+    """Returns the promises that were not kept in time, the longest first."""
+    claims = every(played, broken_promise, overdue_promise, late_promise)
+    return sorted(claims, key=lambda claim: claim.first - claim.last)
 
-    At all the steps s … e component k ≥ 1 is what is promised (see `promised`), which it is not at
-    s − 1 or e + 1, and no end lies between them. They are more than (k + 1)·w steps, so that what
-    was promised at s is overdue at e, and at least `LEAST_SPAN`. Up to e no w steps on end from s
-    on paid half of what was promised, which is the least of component k at these steps, without
-    its discount.
+
+def _is_overdue(
+    played: Played, first: int, last: int, component: int, came: int | None, **_: object
+) -> bool:
+    """Returns whether a reward stayed so far away from a step to another one, and did not come.
+
+    At all these steps the component is what is promised (see `promised`), which it is not at the
+    step before or after, and no end lies between them. Before it came no w steps on end paid half
+    of what was promised: the least of the component there, without its discount.
     """
-
-    first: int
-    last: int
-    component: int
-
-    @property
-    def place(self) -> int:
-        return self.first
-
-    def _is_overdue(self, played: Played) -> bool:
-        episode, c, first, last = played.episode, self.component, self.first, self.last
-        length, total = last - first + 1, len(episode)
-        if not 0 <= first <= last < total or episode.ends[first:last].any():
-            return False
-        found = promised(episode)
-        same = c >= 1 and bool((found[first : last + 1] == c).all())
-        begins = first == 0 or episode.ends[first - 1] or found[first - 1] != c
-        stops = last == total - 1 or episode.ends[last] or found[last + 1] != c
-        overdue = length > (c + 1) * episode.time_axis.width and length >= LEAST_SPAN
-        return bool(same and begins and stops and overdue)
-
-    def _kept_at(self, played: Played) -> int | None:
-        """Returns the first step from s on by which the promise was kept; None if there is none."""
-        episode, axis = played.episode, played.episode.time_axis
-        least = float(episode.predicted[self.first : self.last + 1, self.component].min())
-        for step in range(self.first, len(episode)):
-            begin = max(self.first, step - axis.width + 1)
-            paid = axis.discounts[self.component] * episode.rewards[begin : step + 1].sum()
-            if paid >= HALF * least:
-                return step
-        return None
+    episode, total, found = played.episode, len(played.episode), promised(played.episode)
+    is_same = bool((found[first : last + 1] == component).all())
+    begins = first == 0 or episode.ends[first - 1] or found[first - 1] != component
+    stops = last == total - 1 or episode.ends[last] or found[last + 1] != component
+    is_one = not episode.ends[first:last].any()
+    least = float(episode.predicted[first : last + 1, component].min())
+    width, discount = episode.time_axis.width, episode.time_axis.discounts[component]
+    before = range(first, total if came is None else came)
+    paid = [discount * episode.rewards[max(first, i - width + 1) : i + 1].sum() for i in before]
+    return bool(is_same and begins and stops and is_one) and max(paid) < HALF * least
 
 
-class BrokenPromise(_Broken):
+_STAYED = "From {first:step} to {last:step} a reward was always {away:text} away"
+
+
+@EPISODES.rule(f"{_STAYED}, and never came.", holds=_is_overdue)
+def broken_promise(played: Played) -> Iterator[Fields]:
     """It never came, and the episode ended."""
-
-    def holds(self, played: Played) -> bool:
-        never = self._is_overdue(played) and self._kept_at(played) is None
-        return never and played.episode.terminated
+    if played.episode.terminated:
+        yield from (of for of in _overdue(played) if of["came"] is None)
 
 
-class OverduePromise(_Broken):
+@EPISODES.rule(f"{_STAYED}, and had not come when the episode was cut off.", holds=_is_overdue)
+def overdue_promise(played: Played) -> Iterator[Fields]:
     """It had not come when the episode was cut off."""
-
-    def holds(self, played: Played) -> bool:
-        not_yet = self._is_overdue(played) and self._kept_at(played) is None
-        return not_yet and not played.episode.terminated
+    if not played.episode.terminated:
+        yield from (of for of in _overdue(played) if of["came"] is None)
 
 
-class LatePromise(_Broken):
-    """It came later."""
-
-    came: int
-
-    def holds(self, played: Played) -> bool:
-        overdue = self._is_overdue(played) and self.came > self.last
-        return overdue and self._kept_at(played) == self.came
+@EPISODES.rule(f"{_STAYED}, and came only at {{came:step}}.", holds=_is_overdue)
+def late_promise(played: Played) -> Iterator[Fields]:
+    yield from (of for of in _overdue(played) if of["came"] is not None)
 
 
-Broken = BrokenPromise | OverduePromise | LatePromise
+def _overdue(played: Played) -> Iterator[Fields]:
+    """Yields the stretches of steps at which a promised reward was overdue, and when it came."""
+    episode, axis = played.episode, played.episode.time_axis
+    for first, last, component in _stays(episode):
+        kept = _kept_at(episode, first, last, component)
+        is_long = last - first + 1 > (component + 1) * axis.width
+        if is_long and (kept is None or kept > last):
+            steps = [component * axis.width, (component + 1) * axis.width - 1]
+            away = " to ".join(f"{step:,}" for step in dict.fromkeys(steps))
+            noun = "step" if steps[-1] == 1 else "steps"
+            fields = {"first": first, "last": last, "component": component, "came": kept}
+            yield fields | {"away": f"{away} {noun}"}
+
+
+def _kept_at(episode: Episode, first: int, last: int, component: int) -> int | None:
+    """Returns the first step by which half of what was promised was paid; None if there is none."""
+    width, discount = episode.time_axis.width, episode.time_axis.discounts[component]
+    least = HALF * float(episode.predicted[first : last + 1, component].min())
+    for step in range(first, len(episode)):
+        if discount * episode.rewards[max(first, step - width + 1) : step + 1].sum() >= least:
+            return step
+    return None
 
 
 def promised(episode: Episode) -> IntArray:
@@ -206,17 +197,6 @@ def promised(episode: Episode) -> IntArray:
     best = explicit.argmax(axis=1)
     largest = explicit[np.arange(len(episode)), best]
     return np.where((largest > 0.0) & (largest >= least[best]), best, -1)
-
-
-def broken_promises(played: Played) -> tuple[Broken, ...]:
-    """Returns the promises that were not kept in time, the longest first."""
-    found = sorted(_stays(played.episode), key=lambda stay: stay[0] - stay[1])
-    claims: list[Broken] = []
-    for stay in found:
-        broken = (BrokenPromise if played.episode.terminated else OverduePromise)(*stay)
-        kept = broken._kept_at(played)
-        claims.append(broken if kept is None else LatePromise(*stay, kept))
-    return tuple(claim for claim in claims if claim.holds(played))
 
 
 def _stays(episode: Episode) -> Iterator[tuple[int, int, int]]:

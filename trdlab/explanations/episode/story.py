@@ -1,14 +1,16 @@
 """The story of an episode: what was expected, what turned out otherwise, and how it ended."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from trdlab.arrays import same
-from trdlab.explanations.claims import agrees
-from trdlab.explanations.episode.played import Played, StoryClaim
+from trdlab.explanations.episode.played import EPISODES, Played
 from trdlab.explanations.episode.promises import broken_promises, foreseen
 from trdlab.explanations.episode.surprises import sizes, surprise
+from trdlab.explanations.rules import Claim, Fields, every, first
+from trdlab.explanations.sections import Section
 from trdlab.rollouts.episodes import Episode
 
 MOMENTS = 5
@@ -19,126 +21,6 @@ STANDS_OUT = 0.25
 """A surprise may be what matters most if it is larger than this share of `Played.scale`."""
 ROUNDING = 1e-9
 """What is smaller than this share of `Played.scale` is no surprise at all."""
-
-
-# ---- the beginning and the end -------------------------------------------------------------------
-
-
-class ExpectedAtStart(StoryClaim):
-    """What was expected in all at the first step, and the largest component of it."""
-
-    value: float
-    component: int
-
-    def holds(self, played: Played) -> bool:
-        row = played.episode.expected[0]  # [N+1]
-        largest = len(row) > 1 and int(np.abs(row).argmax()) == self.component
-        return largest and bool(row.any()) and agrees(self.value, float(row.sum()))
-
-
-class ExpectedInAll(StoryClaim):
-    """What was expected at the first step, where there is no explicit component."""
-
-    value: float
-
-    def holds(self, played: Played) -> bool:
-        row = played.episode.expected[0]  # [N+1]
-        return len(row) == 1 and bool(row.any()) and agrees(self.value, float(row.sum()))
-
-
-class ExpectedNothing(StoryClaim):
-    """No component was expected to hold anything at the first step."""
-
-    def holds(self, played: Played) -> bool:
-        return not played.episode.expected[0].any()
-
-
-class NothingChanged(StoryClaim):
-    """No step changed what was expected, but for rounding."""
-
-    def holds(self, played: Played) -> bool:
-        found = sizes(played)
-        return bool(found.size and found.max() <= ROUNDING * played.scale)
-
-
-class LittleChanged(StoryClaim):
-    """The most that a step changed."""
-
-    most: float
-
-    def holds(self, played: Played) -> bool:
-        found = sizes(played)
-        changed = bool(found.size and found.max() > ROUNDING * played.scale)
-        return changed and agrees(self.most, float(found.max()))
-
-
-class Ended(StoryClaim):
-    """The episode terminated after so many steps."""
-
-    steps: int
-
-    def holds(self, played: Played) -> bool:
-        return played.episode.terminated and self.steps == len(played.episode)
-
-
-class CutOff(StoryClaim):
-    """The episode was truncated after so many steps."""
-
-    steps: int
-
-    def holds(self, played: Played) -> bool:
-        return not played.episode.terminated and self.steps == len(played.episode)
-
-
-class _Outcome(StoryClaim):
-    """The discounted reward up to the first end, as of the first step."""
-
-    got: float
-    until: int
-
-    def _is_outcome(self, played: Played) -> bool:
-        until = first_end(played.episode)
-        right = until is not None and until == self.until
-        return right and agrees(self.got, _worth(played.episode, self.until))
-
-
-class AsExpected(_Outcome):
-    """It is what was expected then, but for rounding."""
-
-    def holds(self, played: Played) -> bool:
-        return self._is_outcome(played) and _is_as_expected(played, self.until)
-
-
-class OtherThanExpected(_Outcome):
-    """It is not what was expected then."""
-
-    expected: float
-
-    def holds(self, played: Played) -> bool:
-        right = agrees(self.expected, float(played.episode.expected[0].sum()))
-        return right and self._is_outcome(played) and not _is_as_expected(played, self.until)
-
-
-def first_end(episode: Episode) -> int | None:
-    """Returns the first step after which nothing is left to come, None if a truncation was first.
-
-    That is where the episode terminated, or a life was lost and that counts.
-    """
-    return int(episode.ends.argmax()) if episode.ends.any() else None
-
-
-def _worth(episode: Episode, until: int) -> float:
-    """Returns the reward up to a step, discounted to the first one."""
-    discounts = float(episode.time_axis.gamma) ** np.arange(until + 1)
-    return float(discounts @ episode.rewards[: until + 1])
-
-
-def _is_as_expected(played: Played, until: int) -> bool:
-    got, expected = _worth(played.episode, until), float(played.episode.expected[0].sum())
-    return same(got, expected) or abs(got - expected) <= ROUNDING * played.scale
-
-
-# ---- the story -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,15 +37,19 @@ class Story:
     """
 
     played: Played
-    start: tuple[StoryClaim, ...]
-    moments: tuple[StoryClaim, ...]
-    end: tuple[StoryClaim, ...]
-    most: StoryClaim | None
+    start: tuple[Claim, ...]
+    moments: tuple[Claim, ...]
+    end: tuple[Claim, ...]
+    most: Claim | None
 
     @property
-    def findings(self) -> tuple[StoryClaim, ...]:
+    def claims(self) -> tuple[Claim, ...]:
         """All of it."""
         return (*self.start, *self.moments, *self.end)
+
+    def section(self, seed: int) -> Section:
+        """Returns all of it as a section about the episode with a seed."""
+        return Section("episode", f"The episode with seed {seed}", self.claims)
 
 
 def tell(played: Played, *, moments: int = MOMENTS) -> Story:
@@ -181,14 +67,21 @@ def tell(played: Played, *, moments: int = MOMENTS) -> Story:
     rows = key_rows(played, moments - len(told), *stays)
     surprises = [surprise(played, row) for row in rows]
     large = bool(rows) and sizes(played)[rows[0]] > STANDS_OUT * played.scale
-    first = (*broken, *(surprises[:1] if large else ()))
+    most = (*broken, *(surprises[:1] if large else ()))
+    is_calm = not surprises and not broken
+    calm = first(played, nothing_changed, little_changed) if is_calm else []
     return Story(
         played=played,
-        start=_start(played),
-        moments=tuple(sorted([*told, *surprises], key=lambda claim: claim.place or 0)),
-        end=_end(played, is_calm=not surprises and not broken),
-        most=first[0] if first else None,
+        start=tuple(first(played, expected_nothing, expected_in_all, expected_at_start)),
+        moments=tuple(sorted([*told, *surprises], key=place)),
+        end=(*calm, *every(played, ended, cut_off, as_expected, other_than_expected)),
+        most=most[0] if most else None,
     )
+
+
+def place(claim: Claim) -> int:
+    """Returns the step of the episode that a moment is about."""
+    return int(claim.fields["step"] if "step" in claim.fields else claim.fields["first"])
 
 
 def key_rows(played: Played, count: int, *told: range) -> list[int]:
@@ -214,28 +107,98 @@ def key_rows(played: Played, count: int, *told: range) -> list[int]:
     return chosen
 
 
-def _start(played: Played) -> tuple[StoryClaim, ...]:
+# ---- the beginning and the end -----------------------------------------------------------------
+
+
+@EPISODES.rule("At the start it expected no rewards.")
+def expected_nothing(played: Played) -> Iterator[Fields]:
+    if not played.episode.expected[0].any():
+        yield {}
+
+
+@EPISODES.rule("At the start it expected {value:rewards}.")
+def expected_in_all(played: Played) -> Iterator[Fields]:
+    """There is no explicit component."""
     row = played.episode.expected[0]  # [N+1]
-    if not row.any():
-        return (ExpectedNothing(),)
-    value = float(row.sum())
-    if len(row) == 1:
-        return (ExpectedInAll(value),)
-    return (ExpectedAtStart(value, int(np.abs(row).argmax())),)
+    if len(row) == 1 and row.any():
+        yield {"value": float(row.sum())}
 
 
-def _end(played: Played, *, is_calm: bool) -> tuple[StoryClaim, ...]:
-    episode, until = played.episode, first_end(played.episode)
-    end: list[StoryClaim] = []
+@EPISODES.rule("At the start it expected {value:rewards}, the largest part {component:when}.")
+def expected_at_start(played: Played) -> Iterator[Fields]:
+    row = played.episode.expected[0]  # [N+1]
+    if len(row) > 1 and row.any():
+        yield {"value": float(row.sum()), "component": int(np.abs(row).argmax())}
+
+
+@EPISODES.rule("No step changed what it expected.")
+def nothing_changed(played: Played) -> Iterator[Fields]:
     found = sizes(played)
-    if found.size and is_calm:
-        most = float(found.max())
-        end.append(LittleChanged(most) if most > ROUNDING * played.scale else NothingChanged())
-    end.append((Ended if episode.terminated else CutOff)(len(episode)))
+    if found.size and found.max() <= ROUNDING * played.scale:
+        yield {}
+
+
+@EPISODES.rule("No step changed what it expected by more than {most:bound}.")
+def little_changed(played: Played) -> Iterator[Fields]:
+    found = sizes(played)
+    if found.size and found.max() > ROUNDING * played.scale:
+        yield {"most": float(found.max())}
+
+
+@EPISODES.rule("The episode ended after {steps:steps}{seconds:text}.")
+def ended(played: Played) -> Iterator[Fields]:
+    if played.episode.terminated:
+        yield _length(played)
+
+
+@EPISODES.rule("The episode was cut off after {steps:steps}{seconds:text}.")
+def cut_off(played: Played) -> Iterator[Fields]:
+    if not played.episode.terminated:
+        yield _length(played)
+
+
+@EPISODES.rule("Counted from the start it got {got:rewards}{scope:text}, as it had expected.")
+def as_expected(played: Played) -> Iterator[Fields]:
+    """The discounted reward up to the first end is what was expected then, but for rounding."""
+    yield from (of for of in _outcome(played) if of["is_as_expected"])
+
+
+@EPISODES.rule(
+    "Counted from the start it got {got:rewards}{scope:text}; it had expected {expected:number}."
+)
+def other_than_expected(played: Played) -> Iterator[Fields]:
+    yield from (of for of in _outcome(played) if not of["is_as_expected"])
+
+
+def _outcome(played: Played) -> Iterator[Fields]:
+    episode, until = played.episode, first_end(played.episode)
     if until is not None:
         got, expected = _worth(episode, until), float(episode.expected[0].sum())
-        as_expected = _is_as_expected(played, until)
-        end.append(
-            AsExpected(got, until) if as_expected else OtherThanExpected(got, until, expected)
-        )
-    return tuple(end)
+        is_close = same(got, expected) or abs(got - expected) <= ROUNDING * played.scale
+        lost = f" up to step {until:,}, where a life was lost"
+        yield {
+            "got": got,
+            "expected": expected,
+            "until": until,
+            "scope": "" if until == len(episode) - 1 else lost,
+            "is_as_expected": is_close,
+        }
+
+
+def _length(played: Played) -> Fields:
+    seconds, steps = played.seconds_per_step, len(played.episode)
+    return {"steps": steps, "seconds": "" if seconds is None else f" ({steps * seconds:.2g} s)"}
+
+
+def first_end(episode: Episode) -> int | None:
+    """Returns the first step after which nothing is left to come, None if a truncation was first.
+
+    That is where the episode terminated, or a life was lost and that counts.
+    """
+    return int(episode.ends.argmax()) if episode.ends.any() else None
+
+
+def _worth(episode: Episode, until: int) -> float:
+    """Returns the reward up to a step, discounted to the first one."""
+    discounts = float(episode.time_axis.gamma) ** np.arange(until + 1)
+    return float(discounts @ episode.rewards[: until + 1])

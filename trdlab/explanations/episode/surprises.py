@@ -1,124 +1,165 @@
-"""Claims about steps that turned out other than expected, and why."""
+"""Steps of an episode that turned out other than expected, and why."""
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
 from trdlab.arrays import FloatArray
-from trdlab.explanations.claims import agrees
-from trdlab.explanations.episode.played import Played, StoryClaim
+from trdlab.explanations.episode.played import EPISODES, Played
+from trdlab.explanations.rules import Claim, Fields
 
 FOCUS = 1 / 3
 """The share of a surprise that one component must account for, to be named as its reason."""
 NEARLY = 1 / 4
 """The share of what moved from one step to another by which signs may be mixed there."""
 
-
-class _Turn(StoryClaim):
-    """A step, the action taken then, and what the two changed in what was expected."""
-
-    step: int
-    action: str
-
-    @property
-    def place(self) -> int:
-        return self.step
-
-    def holds(self, played: Played) -> bool:
-        row = played.row(self.step)
-        return row is not None and played.action(self.step) == self.action and self._is(played, row)
-
-    def _is(self, played: Played, row: int) -> bool:
-        raise NotImplementedError
+_TURNED = "At {step:step} {action} turned out {gap:number} {outcome:text} than expected"
 
 
-# ---- more or less in all -------------------------------------------------------------------------
+def surprise(played: Played, row: int) -> Claim:
+    """Returns what is to say of a step that changed something.
+
+    Args:
+        played: the episode.
+        row: the place of the step in its revision.
+    """
+    kind, fields = _turns(played)[row]
+    return Claim(EPISODES.rules[kind], played, fields)
 
 
-class _Surprise(_Turn):
-    """A step that turned out better or worse in all, by as much as the revision sums to."""
-
-    gap: float
-    outcome: str
-
-    def _is(self, played: Played, row: int) -> bool:
-        change = played.revision.change[row]  # [N+1]
-        total, sign = float(change.sum()), {"better": 1.0, "worse": -1.0}.get(self.outcome, 0.0)
-        right = sign * total > 0.0 and agrees(self.gap, abs(total))
-        return right and self._is_why(played, row, sign * change)
-
-    def _is_why(self, played: Played, row: int, directed: FloatArray) -> bool:
-        raise NotImplementedError
+# ---- more or less in all -----------------------------------------------------------------------
 
 
-class Surprise(_Surprise):
+@EPISODES.rule(f"{_TURNED}.")
+def turned_out(played: Played) -> Iterator[Fields]:
     """Nothing is known of when, for there is no explicit component."""
-
-    def _is_why(self, played: Played, row: int, directed: FloatArray) -> bool:
-        return len(directed) == 1
+    yield from _of_kind(played, "turned-out")
 
 
-class EndSurprise(_Surprise):
+@EPISODES.rule(
+    f"{_TURNED}, mainly because {{ending:text}} while {{promised:rewards}} were still expected."
+)
+def ended_early(played: Played) -> Iterator[Fields]:
     """The future ended, which changed more than the reward did."""
-
-    ending: str
-    promised: float
-
-    def _is_why(self, played: Played, row: int, directed: FloatArray) -> bool:
-        last, episode = played.revision.last[row], played.episode
-        is_over = episode.terminated and last == len(episode) - 1
-        right = self.ending == ("the episode ended" if is_over else "a life was lost")
-        promised = float(played.revision.before[row, 1:].sum())
-        return right and _by_end(played, row, directed) and agrees(self.promised, promised)
+    yield from _of_kind(played, "ended-early")
 
 
-class RewardSurprise(_Surprise):
-    """The reward was another than expected."""
-
-    reward: float
-    expected: float
-
-    def _is_why(self, played: Played, row: int, directed: FloatArray) -> bool:
-        came, expected = played.revision.after[row, 0], played.revision.before[row, 0]
-        right = agrees(self.reward, came) and agrees(self.expected, expected)
-        return right and came != 0.0 and _by_component(played, row, directed) == 0
+@EPISODES.rule(
+    f"{_TURNED}, mainly because {{reward:paid}} came where {{expected:number}} was expected."
+)
+def other_reward(played: Played) -> Iterator[Fields]:
+    yield from _of_kind(played, "other-reward")
 
 
-class NoRewardSurprise(_Surprise):
-    """No reward came."""
-
-    expected: float
-
-    def _is_why(self, played: Played, row: int, directed: FloatArray) -> bool:
-        came, expected = played.revision.after[row, 0], played.revision.before[row, 0]
-        right = came == 0.0 and agrees(self.expected, expected)
-        return right and _by_component(played, row, directed) == 0
+@EPISODES.rule(f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.")
+def no_reward(played: Played) -> Iterator[Fields]:
+    yield from _of_kind(played, "no-reward")
 
 
-class BeliefSurprise(_Surprise):
+@EPISODES.rule(
+    f"{_TURNED}, mainly because what it expects {{component:when}} went from {{was:number}} to "
+    "{now:number}."
+)
+def other_belief(played: Played) -> Iterator[Fields]:
     """Another reward is expected of a later component than before."""
-
-    component: int
-    was: float
-    now: float
-
-    def _is_why(self, played: Played, row: int, directed: FloatArray) -> bool:
-        c, of = self.component, played.revision
-        if c < 1 or _by_component(played, row, directed) != c:
-            return False
-        return agrees(self.was, of.before[row, c]) and agrees(self.now, of.after[row, c])
+    yield from _of_kind(played, "other-belief")
 
 
-class SpreadSurprise(_Surprise):
+@EPISODES.rule(f"{_TURNED}, spread over many steps: half of it {{by:within}}.")
+def spread_out(played: Played) -> Iterator[Fields]:
     """Many components changed; half of what speaks for the outcome lies at a step or before."""
+    yield from _of_kind(played, "spread-out")
 
-    by: int
 
-    def _is_why(self, played: Played, row: int, directed: FloatArray) -> bool:
-        width, so_far = played.episode.time_axis.width, np.maximum(directed, 0.0).cumsum()
-        half = int((so_far >= so_far[-1] / 2.0).argmax())
-        spread = not _by_end(played, row, directed) and focus(directed) is None
-        return spread and self.by == (half + 1) * width - 1
+# ---- the same, at another step -----------------------------------------------------------------
+
+
+@EPISODES.rule(
+    "At {step:step} {action} put off {worth:rewards}, now expected {to:when}, not {origin:when}; "
+    "the total hardly changed."
+)
+def put_off(played: Played) -> Iterator[Fields]:
+    """As much is expected as before, but rewards, or costs, lie at a later step."""
+    yield from _of_kind(played, "put-off")
+
+
+@EPISODES.rule(
+    "At {step:step} {action} brought {worth:rewards} forward, now expected {to:when}, not "
+    "{origin:when}; the total hardly changed."
+)
+def brought_forward(played: Played) -> Iterator[Fields]:
+    """As much is expected as before, but rewards, or costs, lie at an earlier step."""
+    yield from _of_kind(played, "brought-forward")
+
+
+@EPISODES.rule(
+    "At {step:step} {action} gained {gain:number} {up:when} and lost {loss:number} {down:when}: "
+    "the total hardly changed."
+)
+def exchanged(played: Played) -> Iterator[Fields]:
+    """As much is expected as before, but more at one step and less at another."""
+    yield from _of_kind(played, "exchanged")
+
+
+# ---- what a step changed -----------------------------------------------------------------------
+
+
+@lru_cache(maxsize=8)
+def _turns(played: Played) -> tuple[tuple[str, Fields], ...]:
+    """Returns `[T′]`, of each step of the revision what kind of turn it was, and its numbers."""
+    return tuple(_turn(played, row) for row in range(len(played.revision)))
+
+
+def _of_kind(played: Played, kind: str) -> Iterator[Fields]:
+    yield from (fields for name, fields in _turns(played) if name == kind)
+
+
+def _turn(played: Played, row: int) -> tuple[str, Fields]:
+    of = played.revision
+    step, before, after = int(of.steps[row]), of.before[row], of.after[row]
+    about: Fields = {"step": step, "action": played.action(step)}
+    up, down, moved = moved_between(after - before)
+    if moved:
+        return _shift(about, before, after, up, down, moved)
+    change = after - before
+    total = float(change.sum())
+    about |= {"gap": abs(total), "outcome": "better" if total > 0.0 else "worse"}
+    directed = np.sign(total) * change  # what is above 0 speaks for the outcome
+    if len(directed) == 1:
+        return "turned-out", about
+    if of.ended[row] and float(directed[1:].sum()) > directed[0]:
+        is_over = played.episode.terminated and of.last[row] == len(played.episode) - 1
+        ending = "the episode ended" if is_over else "a life was lost"
+        return "ended-early", about | {"ending": ending, "promised": float(before[1:].sum())}
+    peak = focus(directed)
+    if peak == 0:
+        expected = {"expected": float(before[0])}
+        if after[0] == 0.0:
+            return "no-reward", about | expected
+        return "other-reward", about | expected | {"reward": float(after[0])}
+    if peak is not None:
+        was, now = float(before[peak]), float(after[peak])
+        return "other-belief", about | {"component": peak, "was": was, "now": now}
+    so_far = np.maximum(directed, 0.0).cumsum()
+    half = int((so_far >= so_far[-1] / 2.0).argmax())
+    return "spread-out", about | {"by": (half + 1) * played.episode.time_axis.width - 1}
+
+
+def _shift(
+    about: Fields, before: FloatArray, after: FloatArray, up: int, down: int, moved: float
+) -> tuple[str, Fields]:
+    """Returns what a step did that moved rewards, or costs, and left the total about the same."""
+    slack = NEARLY * moved
+    if before[up] >= -slack and after[down] >= -slack:
+        worth, origin, to = moved, down, up
+    elif after[up] <= slack and before[down] <= slack:
+        worth, origin, to = -moved, up, down
+    else:
+        gain, loss = float(after[up] - before[up]), float(before[down] - after[down])
+        return "exchanged", about | {"up": up, "gain": gain, "down": down, "loss": loss}
+    kind = "put-off" if to > origin else "brought-forward"
+    return kind, about | {"worth": worth, "origin": origin, "to": to}
 
 
 def focus(directed: FloatArray) -> int | None:
@@ -129,55 +170,6 @@ def focus(directed: FloatArray) -> int | None:
     """
     peak = int(directed.argmax())
     return peak if directed[peak] >= FOCUS * np.maximum(directed, 0.0).sum() else None
-
-
-def _by_end(played: Played, row: int, directed: FloatArray) -> bool:
-    """Returns whether it was above all the end that changed something."""
-    return bool(played.revision.ended[row]) and float(directed[1:].sum()) > directed[0]
-
-
-def _by_component(played: Played, row: int, directed: FloatArray) -> int | None:
-    """Returns the component that accounts for a surprise, None if none or the only one does."""
-    is_known = len(directed) > 1 and not _by_end(played, row, directed)
-    return focus(directed) if is_known else None
-
-
-# ---- the same, at another step -------------------------------------------------------------------
-
-
-class Moved(_Turn):
-    """As much is expected as before, but rewards, or costs, lie at another step."""
-
-    things: str
-    worth: float
-    origin: int
-    to: int
-    way: str
-
-    def _is(self, played: Played, row: int) -> bool:
-        before, after = played.revision.before[row], played.revision.after[row]
-        up, down, moved = moved_between(after - before)
-        ends = {"rewards": (down, up), "costs": (up, down)}.get(self.things)
-        right = ends == (self.origin, self.to) and agrees(self.worth, moved)
-        way = "put off" if self.to > self.origin else "brought forward"
-        return right and way == self.way and _moving(before, after) == self.things
-
-
-class Exchanged(_Turn):
-    """As much is expected as before, but more at one step and less at another."""
-
-    up: int
-    gain: float
-    down: int
-    loss: float
-
-    def _is(self, played: Played, row: int) -> bool:
-        before, after = played.revision.before[row], played.revision.after[row]
-        change = after - before
-        right = moved_between(change)[:2] == (self.up, self.down) and _moving(before, after) == ""
-        return (
-            right and agrees(self.gain, change[self.up]) and agrees(self.loss, -change[self.down])
-        )
 
 
 def moved_between(change: FloatArray) -> tuple[int, int, float]:
@@ -191,20 +183,6 @@ def moved_between(change: FloatArray) -> tuple[int, int, float]:
     return up, down, moved if abs(float(change.sum())) <= moved / 2.0 else 0.0
 
 
-def _moving(before: FloatArray, after: FloatArray) -> str | None:
-    """Returns what moved, `` if that is of mixed sign, None if nothing did."""
-    up, down, moved = moved_between(after - before)
-    slack = NEARLY * moved
-    if moved == 0.0:
-        return None
-    if before[up] >= -slack and after[down] >= -slack:
-        return "rewards"
-    return "costs" if after[up] <= slack and before[down] <= slack else ""
-
-
-# ---- which of them -------------------------------------------------------------------------------
-
-
 def sizes(played: Played) -> FloatArray:
     """Returns `[T′]`, in discounted reward, how much the steps of the revision surprise.
 
@@ -214,39 +192,3 @@ def sizes(played: Played) -> FloatArray:
     amount = np.abs(change.sum(axis=1))
     moved = np.maximum(0.0, np.minimum(change.max(axis=1), -change.min(axis=1)))
     return np.asarray(np.where(amount <= moved / 2.0, moved, amount))
-
-
-def surprise(played: Played, row: int) -> StoryClaim:
-    """Returns what is to say of a step that changed something.
-
-    Args:
-        played: the episode.
-        row: the place of the step in its revision.
-    """
-    return next(claim for claim in _candidates(played, row) if claim.holds(played))
-
-
-def _candidates(played: Played, row: int) -> Iterator[StoryClaim]:
-    of, episode = played.revision, played.episode
-    step, before, after = int(of.steps[row]), of.before[row], of.after[row]
-    turn = (step, played.action(step))
-    up, down, moved = moved_between(after - before)
-    if moved:
-        for things, origin, to in (("rewards", down, up), ("costs", up, down)):
-            way = "put off" if to > origin else "brought forward"
-            yield Moved(*turn, things, moved, origin, to, way)
-        yield Exchanged(*turn, up, float((after - before)[up]), down, float((before - after)[down]))
-    total = float((after - before).sum())
-    gone = (*turn, abs(total), "better" if total > 0.0 else "worse")
-    directed = np.sign(total) * (after - before)
-    is_over = episode.terminated and of.last[row] == len(episode) - 1
-    ending = "the episode ended" if is_over else "a life was lost"
-    yield Surprise(*gone)
-    yield EndSurprise(*gone, ending, float(before[1:].sum()))
-    yield RewardSurprise(*gone, float(after[0]), float(before[0]))
-    yield NoRewardSurprise(*gone, float(before[0]))
-    peak = int(directed.argmax())
-    yield BeliefSurprise(*gone, peak, float(before[peak]), float(after[peak]))
-    so_far = np.maximum(directed, 0.0).cumsum()
-    half = int(np.searchsorted(so_far, so_far[-1] / 2.0))
-    yield SpreadSurprise(*gone, (half + 1) * episode.time_axis.width - 1)

@@ -1,184 +1,109 @@
 """Chances: what is uncertain about what an action is expected to pay."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from trdlab.explanations.claims import Finding, agrees
-from trdlab.explanations.moment.limits import explicit_end
-from trdlab.explanations.moment.moment import Moment
-from trdlab.explanations.moment.peaks import NEGLIGIBLE, SHARE, largest, undiscounted
+from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.explanations.moment.steps import (
+    NEGLIGIBLE,
+    SHARE,
+    explicit_end,
+    largest,
+    undiscounted,
+)
+from trdlab.explanations.rules import Fields
 
 
-def likelihood(moment: Moment, action: str) -> Iterator[Finding]:
-    """Yields the chance that a learned forecast implies, where it is one.
-
-    Args:
-        moment: the decompositions of every action.
-        action: the name of one of which something is expected.
-    """
-    if moment.only_reward is not None and not moment.is_exact:
-        i = largest(moment, action)
-        chance = float(undiscounted(moment, action)[i] / moment.only_reward)
-        claim = PutAt(action, i, moment.only_reward, chance)
-        if claim.holds(moment):
-            yield claim
-
-
-def chances(moment: Moment, action: str, named: Collection[int] = ()) -> Iterator[Finding]:
-    """Yields how much an action's reward varies, where one step does, and how long it lasts.
-
-    Args:
-        moment: the decompositions of every action, and how uncertain they are.
-        action: the name of one.
-        named: components whose chances have been told.
-    """
-    known, a = moment.uncertainty, moment.index(action)
-    if known is None:
-        return
-    varies = GiveOrTake(action, moment.q_value(action), float(known.return_deviation[a]))
-    if varies.holds(moment):
-        yield varies
-    either = [
-        EitherOr(action, i, verb_of(reward), abs(reward), chance)
-        for i, (reward, chance) in one_or_nothing(moment, action).items()
-    ]
-    if either:
-        most = max(either, key=lambda x: x.amount * x.chance)
-        if most.component not in named and most.holds(moment):
-            yield most
-    over = np.flatnonzero(known.survival[a] < 0.5)
-    if over.size:
-        i = int(over[0])
-        chance = 1.0 - float(known.survival[a, i])
-        sure = SurelyOver(action, i)
-        yield sure if sure.holds(moment) else LikelyOver(action, i, chance)
-
-
-def one_or_nothing(moment: Moment, action: str) -> dict[int, tuple[float, float]]:
-    """Returns the steps that pay one amount, or cost one, or nothing: the reward, and its chance.
-
-    Args:
-        moment: the decompositions of every action, and how uncertain they are.
-        action: the name of one.
-    """
-    known = moment.uncertainty
+def outcomes_of(choice: Choice) -> Sequence[dict[float, float]]:
+    """Returns the chance of each reward at each explicit step; nothing where it is not known."""
+    known = choice.moment.uncertainty
     if known is None or not known.outcomes:
-        return {}
-    steps = known.outcomes[moment.index(action)][: explicit_end(moment, action)]
-    return {
-        i: (reward, chance)
-        for i, step in enumerate(steps)
-        for reward, chance in step.items()
-        if set(step) == {0.0, reward} and reward != 0.0
-    }
+        return ()
+    end = explicit_end(choice.moment, choice.action)
+    return known.outcomes[choice.moment.index(choice.action)][:end]
 
 
-def verb_of(reward: float) -> str:
-    """Returns what an action does that is rewarded so."""
-    return "pays" if reward > 0.0 else "costs"
-
-
-class PutAt(Finding):
+@CHOICES.rule(
+    "It puts the chance that {action} pays {reward:number} {component:when} at {chance:percent}."
+)
+def put_at(choice: Choice) -> Iterator[Fields]:
     """The chance that the largest component implies, where one reward or none is ever observed.
 
     With w = 1 component k is γ^k·c times the probability that step k pays c (errata P9, P10).
     """
-
-    action: str
-    component: int
-    reward: float
-    chance: float
-
-    def holds(self, moment: Moment) -> bool:
-        row, paid = undiscounted(moment, self.action), moment.only_reward
-        if paid is None or moment.trust is None or moment.time_axis.width != 1 or not row.any():
-            return False
-        chance = float(row[largest(moment, self.action)] / paid)
-        return (
-            self.component == largest(moment, self.action)
-            and 0.0 < chance <= 1.0
-            and agrees(self.reward, paid)
-            and agrees(self.chance, chance)
-        )
+    moment, paid = choice.moment, choice.moment.only_reward
+    row = undiscounted(moment, choice.action)
+    is_judged = moment.trust is not None and not moment.is_exact
+    if paid is None or not is_judged or choice.time_axis.width != 1 or not row.any():
+        return
+    i = largest(moment, choice.action)
+    chance = float(row[i] / paid)
+    if 0.0 < chance <= 1.0:
+        yield {"action": choice.action, "reward": paid, "component": i, "chance": chance}
 
 
-class GiveOrTake(Finding):
-    """The standard deviation of an action's whole discounted reward, if it is not `NEGLIGIBLE`."""
-
-    action: str
-    value: float
-    deviation: float
-
-    def holds(self, moment: Moment) -> bool:
-        if moment.uncertainty is None:
-            return False
-        deviation = float(moment.uncertainty.return_deviation[moment.index(self.action)])
-        value = moment.q_value(self.action)
-        return (
-            deviation > NEGLIGIBLE * abs(value)
-            and agrees(self.value, value)
-            and agrees(self.deviation, deviation)
-        )
+@CHOICES.rule(
+    "{action} is worth {value:number} on average; single episodes differ from that by about "
+    "{deviation:number}."
+)
+def give_or_take(choice: Choice) -> Iterator[Fields]:
+    """One standard deviation of the whole discounted reward, if it is not `NEGLIGIBLE`."""
+    moment, action = choice.moment, choice.action
+    if moment.uncertainty is not None:
+        deviation = float(moment.uncertainty.return_deviation[moment.index(action)])
+        value = moment.q_value(action)
+        if deviation > NEGLIGIBLE * abs(value):
+            yield {"action": action, "value": value, "deviation": deviation}
 
 
-class EitherOr(Finding):
+@CHOICES.rule("There is a {chance:percent} chance that {action} {reward:pays} {component:when}.")
+def either_or(choice: Choice) -> Iterator[Fields]:
     """A step that pays one amount or nothing; of several, where most of it is expected.
 
     The amount matters: it is at least `SHARE` of the action's value and of the largest reward that
     is expected of it at one step, and what is expected of it at least `NEGLIGIBLE`.
     """
-
-    action: str
-    component: int
-    verb: str
-    amount: float
-    chance: float
-
-    def holds(self, moment: Moment) -> bool:
-        either = one_or_nothing(moment, self.action)
-        if self.component not in either:
-            return False
-        expected = {i: abs(reward) * chance for i, (reward, chance) in either.items()}
-        reward, chance = either[self.component]
-        row = undiscounted(moment, self.action)
-        scale = max(abs(moment.q_value(self.action)), float(np.abs(row).max()))
-        return (
-            self.component == max(expected, key=expected.__getitem__)
-            and abs(reward) >= SHARE * scale
-            and expected[self.component] >= NEGLIGIBLE * scale
-            and self.verb == verb_of(reward)
-            and agrees(self.amount, abs(reward))
-            and agrees(self.chance, chance)
-        )
+    either = {
+        i: (reward, chance)
+        for i, step in enumerate(outcomes_of(choice))
+        for reward, chance in step.items()
+        if set(step) == {0.0, reward} and reward != 0.0
+    }
+    if not either:
+        return
+    expected = {i: abs(reward) * chance for i, (reward, chance) in either.items()}
+    i = max(expected, key=expected.__getitem__)
+    row = undiscounted(choice.moment, choice.action)
+    scale = max(abs(choice.moment.q_value(choice.action)), float(np.abs(row).max()))
+    reward, chance = either[i]
+    if abs(reward) >= SHARE * scale and expected[i] >= NEGLIGIBLE * scale:
+        yield {"action": choice.action, "reward": reward, "component": i, "chance": chance}
 
 
-class LikelyOver(Finding):
+@CHOICES.rule(
+    "After {action} the episode has ended {last_step:within} with {chance:percent} probability."
+)
+def likely_over(choice: Choice) -> Iterator[Fields]:
     """The first component at whose beginning the episode has more likely ended than not."""
-
-    action: str
-    component: int
-    chance: float
-
-    def holds(self, moment: Moment) -> bool:
-        survival = _survival_when_likely_over(moment, self.action, self.component)
-        return survival is not None and survival > 0.0 and agrees(self.chance, 1.0 - survival)
+    yield from (over for over in _over(choice) if over["chance"] < 1.0)
 
 
-class SurelyOver(Finding):
-    """The same where it has ended for certain."""
-
-    action: str
-    component: int
-
-    def holds(self, moment: Moment) -> bool:
-        return _survival_when_likely_over(moment, self.action, self.component) == 0.0
+@CHOICES.rule("After {action} the episode is over {last_step:within}.")
+def surely_over(choice: Choice) -> Iterator[Fields]:
+    """It has ended for certain by the first component at which it has likely ended."""
+    yield from (over for over in _over(choice) if over["chance"] == 1.0)
 
 
-def _survival_when_likely_over(moment: Moment, action: str, component: int) -> float | None:
-    """Returns the survival at a component, if it is the first at which it is below one half."""
-    if moment.uncertainty is None:
-        return None
-    survival = moment.uncertainty.survival[moment.index(action)]
-    below = np.flatnonzero(survival < 0.5)
-    return float(survival[component]) if below.size and below[0] == component else None
+VARYING, LASTING = (give_or_take,), (likely_over, surely_over)
+
+
+def _over(choice: Choice) -> Iterator[Fields]:
+    known = choice.moment.uncertainty
+    if known is not None:
+        survival = known.survival[choice.moment.index(choice.action)]
+        below = np.flatnonzero(survival < 0.5)
+        if below.size:
+            last_step = choice.time_axis.start(int(below[0])) - 1
+            chance = 1.0 - float(survival[below[0]])
+            yield {"action": choice.action, "last_step": last_step, "chance": chance}

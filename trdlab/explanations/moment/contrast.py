@@ -1,170 +1,322 @@
-"""Contrast: how two actions' futures differ."""
+"""Contrast: how the futures of two actions differ, and what decides between them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 
 import numpy as np
 
 from trdlab.arrays import same
-from trdlab.explanations.claims import Finding, agrees
 from trdlab.explanations.moment.leads import (
-    LEADS,
-    MakesUp,
-    Overtakes,
+    are_costs,
+    are_sure,
+    better_of,
     crossings,
-    difference,
-    sooner,
+    has_costs,
+    is_by_discount,
+    is_immediate,
+    is_tied,
+    leads_of,
+    sums,
 )
-from trdlab.explanations.moment.limits import doubtful
-from trdlab.explanations.moment.moment import Moment
-from trdlab.explanations.moment.worth import Better, EqualValues, compare_totals, compare_values
+from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.explanations.moment.steps import doubtful
+from trdlab.explanations.rules import Claim, Fields, every, first
 
+_DECIDES = 0.8  # of all that differs: what lies at one step decides
 _MOST_DOUBT = 0.5  # of a difference, to tell what comes when
 _MOST_REASONS = 6  # components that people still look at
 
 
-def contrast(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
-    """Returns how an action's future differs from its foil's.
+def contrast(choice: Choice) -> list[Claim]:
+    """Returns how an action's future differs from its foil's, what matters most first.
 
-    In order: the undiscounted totals, which is worth more, which pays sooner, where the running
-    totals cross, and the few components that justify the better one. A lead of the action that is
-    worth less is always followed by what makes up for it. Where more than half of the difference is
-    not to be trusted, that is said instead of what comes when.
-
-    Args:
-        moment: the decompositions of every action.
-        action: the name of one.
-        foil: the name of another.
-
-    Raises:
-        InputError: there is no such action, or they are the same.
+    Who is ahead comes first, and of a lead of the action that is worth less what makes up for it;
+    then totals and values, and the few steps that are enough to prefer the better action. Where
+    more than half of the difference is not to be trusted, that is told in place of what comes when.
     """
-    moment.index(action), moment.index(foil)
-    worth = (*compare_totals(moment, action, foil), compare_values(moment, action, foil))
-    if not difference(moment, action, foil).any():
-        return (*worth, SameComponents(action, foil))
-    doubt = DoubtfulDifference(action, foil, doubtful_share(moment, action, foil))
-    if doubt.holds(moment):
-        return (*worth, doubt)
+    if nothing := first(choice, nothing_at_all, nothing_on_average):
+        return nothing
+    worth = every(choice, equal_totals, different_totals, no_total)
+    worth += first(choice, better_by_discount, better_against_total, better, equal_values)
+    if alike := first(choice, same_components):
+        return alike + worth
+    if doubt := every(choice, untested_difference):
+        return worth[-1:] + doubt + worth[:-1]
+    ahead = first(choice, more_immediate, costs_less, pays_more)
+    turns = every(choice, overtakes, makes_up)
+    decided = every(choice, decided_at)
+    told = decided if decided and not turns else ahead + turns
     return (
-        *worth,
-        *sooner(moment, action, foil),
-        *crossings(moment, action, foil),
-        *_reasons(moment, action, foil),
+        told + worth + ([] if told is decided else decided) + every(choice, never_behind, reasons)
     )
 
 
-def in_short(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Returns which action is worth more, and the first that is said of why.
-
-    Where that is a lead of the other action, what makes up for it is the last word.
-
-    Args:
-        findings: a contrast, in its order.
-    """
-    essential = [x for x in findings if isinstance(x, _ESSENTIAL)]
-    worth, why = essential[:1], essential[1:]
-    is_of_worse = any(
-        isinstance(x, Better) and isinstance(y, LEADS) and y.leader == x.worse
-        for x, y in zip(worth, why, strict=False)
-    )
-    return (*worth, *why[: 2 if is_of_worse else 1])
+def in_brief(choice: Choice) -> list[Claim]:
+    """Returns who is ahead and why, and what the discount has to do with it."""
+    told = contrast(choice)
+    kinds = [claim.kind for claim in told]
+    turn = next((c for c in reversed(told) if c.kind in ("overtakes", "makes-up")), None)
+    brief = told[:1] if turn is None or turn is told[0] else [told[0], turn]
+    if {"better-by-discount", "better-against-total"} & set(kinds):
+        return brief + [c for c in told if c.kind in _BY_DISCOUNT]
+    return brief + [c for c in told if c.kind in ("better", "equal-values") and c not in brief]
 
 
-def _reasons(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
-    if same(moment.q_value(action), moment.q_value(foil)):
-        return ()
-    better, worse = moment.ordered(action, foil)
-    delta = difference(moment, better, worse)
-    if len(delta) == 1:
-        return ()
+_BY_DISCOUNT = ("different-totals", "better-by-discount", "better-against-total")
+
+# ---- what is paid in total, and what that is worth now -------------------------------------------
+
+
+@CHOICES.rule("Both pay {total:number} in total{averages:averages}{ties:ties}.")
+def equal_totals(choice: Choice) -> Iterator[Fields]:
+    if choice.foil is not None and not is_by_discount(choice):
+        a, b = (choice.moment.total(name) for name in (choice.action, choice.foil))
+        if same(a, b):
+            yield {"total": a, "averages": are_sure(choice), "ties": is_tied(choice)}
+
+
+@CHOICES.rule(
+    "In total {more} {more_total:pays} and {less} {less_total:pays}{averages:averages}{ties:ties}."
+)
+def different_totals(choice: Choice) -> Iterator[Fields]:
+    for more, less in choice.orders:
+        a, b = choice.moment.total(more), choice.moment.total(less)
+        if a > b and not same(a, b):
+            yield {
+                "more": more,
+                "less": less,
+                "more_total": a,
+                "less_total": b,
+                "averages": are_sure(choice),
+                "ties": is_tied(choice),
+            }
+
+
+@CHOICES.rule("The rewards after {action} may never end, so there is no total.")
+def no_total(choice: Choice) -> Iterator[Fields]:
+    for action, _ in choice.orders:
+        if choice.moment.totals is not None and np.isnan(choice.moment.total(action)):
+            yield {"action": action}
+
+
+@CHOICES.rule(
+    "Both pay {total:number} in total{average:average}, but each step of waiting makes a reward "
+    "count {loss:percent} less: {better} is worth {better_value:number}, {worse} "
+    "{worse_value:number}."
+)
+def better_by_discount(choice: Choice) -> Iterator[Fields]:
+    if is_by_discount(choice):
+        total = choice.moment.total(choice.action)
+        yield from better_of(choice, total=total, average=are_sure(choice))
+
+
+@CHOICES.rule(
+    "But each step of waiting makes a reward count {loss:percent} less: {better} is worth "
+    "{better_value:number}, {worse} {worse_value:number}."
+)
+def better_against_total(choice: Choice) -> Iterator[Fields]:
+    for fields in better_of(choice):
+        a, b = (choice.moment.total(fields[name]) for name in ("better", "worse"))
+        if a < b and not same(a, b):
+            yield fields
+
+
+@CHOICES.rule(
+    "{better} is worth {better_value:number} now and {worse} {worse_value:number}, with γ = "
+    "{gamma:given}."
+)
+def better(choice: Choice) -> Iterator[Fields]:
+    yield from better_of(choice)
+
+
+@CHOICES.rule("{action} and {foil} are worth the same: {value:number}.")
+def equal_values(choice: Choice) -> Iterator[Fields]:
+    for action, foil in choice.orders[:1]:
+        a, b = choice.moment.q_value(action), choice.moment.q_value(foil)
+        if same(a, b):
+            yield {"action": action, "foil": foil, "value": a}
+
+
+@CHOICES.rule("Nothing is expected of any action here.")
+def nothing_at_all(choice: Choice) -> Iterator[Fields]:
+    moment = choice.moment
+    is_chancy = moment.uncertainty is not None and moment.uncertainty.return_deviation.any()
+    if not moment.decomposition.components.any() and not is_chancy:
+        yield {}
+
+
+@CHOICES.rule("On average no action pays anything here, but single episodes differ.")
+def nothing_on_average(choice: Choice) -> Iterator[Fields]:
+    if not choice.moment.decomposition.components.any() and not any(nothing_at_all(choice)):
+        yield {}
+
+
+# ---- who is ahead, and when ----------------------------------------------------------------------
+
+
+@CHOICES.rule("{action} and {foil} lead to the same rewards at the same times{averages:averages}.")
+def same_components(choice: Choice) -> Iterator[Fields]:
+    for action, foil in choice.orders[:1]:
+        if not choice.moment.difference(action, foil).any():
+            yield {"action": action, "foil": foil, "averages": are_sure(choice)}
+
+
+@CHOICES.rule(
+    "{share:percent} of the difference between {action} and {foil} comes {components:whens}, and "
+    "that {state:text}."
+)
+def untested_difference(choice: Choice) -> Iterator[Fields]:
+    for action, foil in choice.orders[:1]:
+        size = np.abs(choice.moment.difference(action, foil))
+        doubt = doubtful(choice.moment, action) | doubtful(choice.moment, foil)
+        share = float(size[doubt].sum() / size.sum()) if size.any() else 0.0
+        if share > _MOST_DOUBT:
+            components = tuple(np.flatnonzero(doubt & (size > 0.0)).tolist())
+            states = {
+                choice.moment.status_of(name)[i] for name in (action, foil) for i in components
+            }
+            state = "was not tested" if states <= {"good", "not tested"} else "is not to be trusted"
+            about = {"share": share, "action": action, "foil": foil, "state": state}
+            yield about | {"components": components}
+
+
+@CHOICES.rule(
+    "What decides comes {component:when}: {better} {better_sum:pays} and {worse} "
+    "{worse_sum:pays}{averages:averages}."
+)
+def decided_at(choice: Choice) -> Iterator[Fields]:
+    """Most of all that differs lies at one explicit component, and speaks for the better action."""
+    for fields in better_of(choice):
+        a, b = fields["better"], fields["worse"]
+        delta = choice.moment.difference(a, b)
+        i = int(delta.argmax())
+        if i < choice.time_axis.horizon and delta[i] >= _DECIDES * np.abs(delta).sum():
+            rows = (choice.moment.components(a), choice.moment.components(b))
+            yield {
+                "component": i,
+                "better": a,
+                "worse": b,
+                "better_sum": float(rows[0][i]),
+                "worse_sum": float(rows[1][i]),
+                "averages": are_sure(choice, slice(i, i + 1)),
+            }
+
+
+@CHOICES.rule(
+    "{leader} gives more immediate rewards: {leader_sum:number} {last_step:within}, where {other} "
+    "{other_sum:gives}{averages:averages}."
+)
+def more_immediate(choice: Choice) -> Iterator[Fields]:
+    """Rewards come soon, and no cost comes with them."""
+    for lead in leads_of(choice):
+        if is_immediate(choice, lead):
+            yield lead
+
+
+@CHOICES.rule(
+    "{leader} costs less: {leader_cost:number} {last_step:within}, where {other} costs "
+    "{other_cost:number}{averages:averages}."
+)
+def costs_less(choice: Choice) -> Iterator[Fields]:
+    """There are nothing but costs; the sums are what it costs."""
+    for lead in leads_of(choice):
+        if are_costs(choice, lead):
+            leader, other = -lead["leader_sum"], -lead["other_sum"]
+            yield lead | {"leader_cost": abs(leader), "other_cost": other}
+
+
+@CHOICES.rule(
+    "{last_step:within}{net:net} {leader} {leader_sum:pays} and {other} {other_sum:pays}"
+    "{averages:averages}."
+)
+def pays_more(choice: Choice) -> Iterator[Fields]:
+    """Rewards do not come soon, or costs come with them."""
+    for lead in leads_of(choice):
+        if not is_immediate(choice, lead) and not are_costs(choice, lead):
+            yield lead | {"net": has_costs(choice, lead)}
+
+
+@CHOICES.rule(
+    "{leader} overtakes {other} {component:when}: up to then {leader} {leader_sum:pays} and "
+    "{other} {other_sum:pays}{averages:averages}."
+)
+def overtakes(choice: Choice) -> Iterator[Fields]:
+    for leader, other, i in crossings(choice):
+        if i < choice.time_axis.horizon:
+            yield sums(choice, leader, other, i + 1) | {"component": i}
+
+
+@CHOICES.rule(
+    "But what comes {component:when} decides: there {leader} pays {more:number} more than {other}"
+    "{averages:averages}."
+)
+def makes_up(choice: Choice) -> Iterator[Fields]:
+    """The running total of one action passes the other's at the residual."""
+    for leader, other, i in crossings(choice):
+        if i == choice.time_axis.horizon:
+            yield {
+                "component": i,
+                "leader": leader,
+                "other": other,
+                "more": float(choice.moment.difference(leader, other)[i]),
+                "averages": are_sure(choice, slice(i, i + 1)),
+            }
+
+
+@CHOICES.rule("{leader} is never behind {other} in {count:next}, nor in the end.")
+def never_behind(choice: Choice) -> Iterator[Fields]:
+    """Step by step its running total is no smaller, and larger in the end; w = 1."""
+    axis = choice.time_axis
+    for leader, other in choice.orders:
+        lead = choice.moment.lead(leader, other)
+        is_ahead = bool((lead >= 0).all()) and (lead[:-1] > 0).any() and lead[-1] > 0
+        if axis.width == 1 and is_ahead:
+            yield {"leader": leader, "other": other, "count": axis.horizon}
+
+
+# ---- what is enough to prefer one ----------------------------------------------------------------
+
+
+def _is_sufficient(
+    choice: Choice, better: str, worse: str, components: tuple[int, ...], **sums: float
+) -> bool:
+    """Returns whether these components outweigh all that is against, and no fewer do."""
+    delta = choice.moment.difference(better, worse)
     against = float(-delta[delta < 0].sum())
-    if against == 0.0:
-        return (Dominates(better, worse),)
-    chosen: list[int] = []
-    for i in np.argsort(-delta, kind="stable"):
-        chosen.append(int(i))
-        advantage = float(delta[chosen].sum())
-        if advantage > against:
-            break
-    if len(chosen) > _MOST_REASONS:
-        return ()
-    return (Reasons(better, worse, tuple(sorted(chosen)), advantage, against),)
+    chosen = sorted((float(delta[i]) for i in components), reverse=True)
+    rest = np.delete(delta, components)
+    return (
+        sum(chosen) > against > 0.0
+        and not sum(chosen[:-1]) > against
+        and bool((rest <= chosen[-1]).all())
+        and same(sums["advantage"], sum(chosen))
+        and same(sums["disadvantage"], against)
+    )
 
 
-class SameComponents(Finding):
-    """Both actions have the same decomposition."""
-
-    action: str
-    foil: str
-
-    def holds(self, moment: Moment) -> bool:
-        return not difference(moment, self.action, self.foil).any()
-
-
-class DoubtfulDifference(Finding):
-    """More than half of the difference, Σ|action − foil|, lies in components not to be trusted."""
-
-    action: str
-    foil: str
-    share: float
-
-    def holds(self, moment: Moment) -> bool:
-        share = doubtful_share(moment, self.action, self.foil)
-        return share > _MOST_DOUBT and agrees(self.share, share)
-
-
-class Dominates(Finding):
-    """One action is at least as good in every component, and better in some."""
-
-    better: str
-    worse: str
-
-    def holds(self, moment: Moment) -> bool:
-        delta = difference(moment, self.better, self.worse)
-        return len(delta) > 1 and bool((delta >= 0).all()) and bool((delta > 0).any())
-
-
-class Reasons(Finding):
+@CHOICES.rule(
+    "What comes {components:whens} is enough to prefer {better}: {advantage:number} more there, "
+    "against {disadvantage:number} for {worse} elsewhere.",
+    holds=_is_sufficient,
+)
+def reasons(choice: Choice) -> Iterator[Fields]:
     """The fewest components whose advantage outweighs all that speaks for the worse action.
 
     This is the minimal sufficient explanation of Juozapaitis et al. (2019), over time.
     """
-
-    better: str
-    worse: str
-    components: tuple[int, ...]
-    advantage: float
-    disadvantage: float
-
-    def holds(self, moment: Moment) -> bool:
-        delta = difference(moment, self.better, self.worse)
-        if not self.components or max(self.components) >= len(delta):
-            return False
-        chosen, against = delta[list(self.components)], -delta[delta < 0].sum()
-        largest = np.argsort(-delta, kind="stable")[: len(chosen)]  # of equals the earlier
-        return (
-            self.components == tuple(sorted(largest))
-            and bool(chosen.sum() > against > 0)
-            and not delta[largest[:-1]].sum() > against
-            and agrees(self.advantage, float(chosen.sum()))
-            and agrees(self.disadvantage, float(against))
-        )
-
-
-def doubtful_share(moment: Moment, action: str, foil: str) -> float:
-    """Returns the share of Σ|action − foil| in components not to be trusted; 0 of no difference."""
-    size = np.abs(difference(moment, action, foil))
-    doubt = doubtful(moment, action) | doubtful(moment, foil)
-    return float(size[doubt].sum() / size.sum()) if size.any() else 0.0
-
-
-_ESSENTIAL = (
-    Better,
-    EqualValues,
-    SameComponents,
-    DoubtfulDifference,
-    *LEADS,
-    Overtakes,
-    MakesUp,
-    Dominates,
-)
+    for fields in better_of(choice):
+        better, worse = fields["better"], fields["worse"]
+        delta = choice.moment.difference(better, worse)
+        against = float(-delta[delta < 0].sum())
+        chosen: list[int] = []
+        for i in np.argsort(-delta, kind="stable").tolist():
+            chosen.append(i)
+            if delta[chosen].sum() > against:
+                break
+        if against > 0.0 and len(chosen) <= _MOST_REASONS:
+            yield {
+                "components": tuple(sorted(chosen)),
+                "better": better,
+                "worse": worse,
+                "advantage": float(delta[chosen].sum()),
+                "disadvantage": against,
+            }

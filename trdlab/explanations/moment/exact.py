@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.arrays import RELATIVE_ZERO, BoolArray, FloatArray, IntArray
 from trdlab.explanations.moment.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
@@ -38,13 +38,39 @@ def tabular_moment(
         action_names=tuple(action_names),
         future=table.future,
         policy=solution.policy[state],
-        totals=undiscounted_totals(mdp, solution.policy)[state],
-        changes_state=tuple(bool(moves) for moves in mdp.leaves_state[state]),
+        totals=_totals(table, state),
+        stays=_stays(mdp, state),
+        is_over=bool(mdp.terminal_states[state]),
         tied=tuple(name for name, is_tied in tied if is_tied),
         tied_later=int((table.ambiguous & _later(table, state)).sum()) - here,
         what_ifs=tuple(what_ifs),
         uncertainty=_uncertainty(table, state),
     )
+
+
+def _totals(table: ExactTable, state: int) -> FloatArray:
+    """Returns `[A]`: the undiscounted totals, 0 where rewards and costs cancel but for rounding."""
+    totals = undiscounted_totals(table.mdp, table.solution.policy)[state]
+    size = np.abs(table.decomposition.components[state]).sum(axis=-1)  # [A]
+    return np.where(np.abs(totals) <= RELATIVE_ZERO * size, 0.0, totals)
+
+
+def _stays(mdp: MDP, state: int) -> tuple[float, ...]:
+    """Returns `[A]`: how likely each action leaves the state as it is.
+
+    It is 0 of an action that pays less than another one that surely stays: to fall off a cliff and
+    begin anew is no bump into a wall.
+    """
+    rows = state * mdp.num_actions + np.arange(mdp.num_actions)
+    chances, rewards = np.zeros(mdp.num_actions), np.zeros(mdp.num_actions)
+    for action, row in enumerate(rows):
+        part = slice(mdp.offsets[row], mdp.offsets[row + 1])
+        back = (mdp.next_states[part] == state) & ~mdp.terminated[part]
+        chances[action] = mdp.probabilities[part][back].sum()
+        rewards[action] = mdp.probabilities[part] @ mdp.rewards[part]
+    sure = chances >= 1.0 - 1e-12
+    worse = rewards < rewards[sure].max(initial=-np.inf)
+    return tuple(np.where(sure & worse, 0.0, chances).tolist())
 
 
 def _uncertainty(table: ExactTable, state: int) -> Uncertainty | None:
@@ -131,15 +157,15 @@ def source_name(world: Gridworld, source: Source) -> str:
     >>> from trdlab.gridworld import load_map
     >>> world = Gridworld(load_map("drone"))
     >>> [source_name(world, source) for source in world.sources]
-    ['the reward for each coin', 'the reward for the treasure']
+    ['each coin', 'the treasure']
     """
     if source.kind == "step":
-        return "the reward for each step"
+        return "each step"
     cells = [world.grid.legend[symbol] for row in world.grid.rows for symbol in row]
     count = sum(cell.kind == source.kind and cell.value == source.value for cell in cells)
     alike = {other for other in world.sources if other.kind == source.kind}
     worth = f" of {source.value:g}" if len(alike) > 1 else ""
-    return f"the reward for {'the' if count == 1 else 'each'} {source.kind}{worth}"
+    return f"{'the' if count == 1 else 'each'} {source.kind}{worth}"
 
 
 class _Resolved:

@@ -1,22 +1,23 @@
 """Forecast: what one action is expected to pay, and when."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from trdlab.explanations.claims import Finding, agrees, one_sign
-from trdlab.explanations.moment.chances import chances, likelihood, one_or_nothing
-from trdlab.explanations.moment.limits import doubtful, explicit_end
-from trdlab.explanations.moment.moment import Moment
-from trdlab.explanations.moment.peaks import (
-    Rhythm,
-    effect_of,
+from trdlab.arrays import RELATIVE_ZERO, FloatArray
+from trdlab.explanations.moment.chances import LASTING, VARYING, either_or, outcomes_of, put_at
+from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.explanations.moment.peaks import regular, rhythm, steady
+from trdlab.explanations.moment.steps import (
+    doubtful,
+    explicit_end,
     largest,
-    regular,
+    least,
+    speaks_of_all,
     stands_out,
-    steady,
     undiscounted,
 )
+from trdlab.explanations.rules import Claim, Fields, every, first
 
 _MATTERS = 0.5
 """An error is told that is at least this share of what is expected."""
@@ -24,268 +25,206 @@ _MATTERS = 0.5
 _TOO_LITTLE = 0.05  # of an action's value, to tell that it lies beyond
 
 
-def forecast(moment: Moment, action: str) -> tuple[Finding, ...]:
+def forecast(choice: Choice) -> list[Claim]:
     """Returns when an action's first reward comes, its peaks, its centre and what lies beyond N.
 
     Nothing is said of components that are not to be trusted. Shares and centres are defined only
     where all components have one sign, and the centre only for w = 1; where they are not defined
-    there is no finding.
-
-    Args:
-        moment: the decompositions of every action.
-        action: the name of one.
-
-    Raises:
-        InputError: there is no such action.
+    there is no claim.
     """
-    row, end = moment.components(action), explicit_end(moment, action)
-    if doubtful(moment, action).all():
-        return ()
-    if not row[:end].any():
-        return (*_nothing(moment, action), *chances(moment, action))
-    always = steady(moment, action)
-    when = tuple(_when(moment, action)) if always is None else (always,)
-    is_regular = always is not None or any(isinstance(x, Rhythm) for x in when)
-    named = {x.component for x in when if isinstance(x, FirstChance)}
-    return (
-        *when,
-        *_accuracy(moment, action),
-        *_beyond(moment, action),
-        *(() if is_regular else _centre(moment, action)),
-        *chances(moment, action, named),
-    )
+    end = explicit_end(choice.moment, choice.action)
+    if doubtful(choice.moment, choice.action).all():
+        return []
+    chances = every(choice, *VARYING, *LASTING)
+    if not choice.moment.components(choice.action)[:end].any():
+        nothing = first(choice, earns_nothing, zero_on_average, all_beyond, nothing_before)
+        return nothing + chances
+    when = first(choice, steady, next_to_nothing)
+    if not when:
+        when = every(choice, *FIRSTS)
+        named = {claim.component for claim in when}
+        when += [c for c in every(choice, either_or) if c.component not in named]
+        when += every(choice, put_at) + regular(choice, named)
+    is_regular = bool(every(choice, steady, rhythm))
+    centre = [] if is_regular else every(choice, centre_of_mass)
+    return when + every(choice, off_by, share_beyond) + centre + chances
 
 
-def _when(moment: Moment, action: str) -> Iterator[Finding]:
-    """Yields what comes first, how likely the largest reward is, and where rewards peak."""
-    if not stands_out(moment, action).any():
-        yield NextToNothing(action, explicit_end(moment, action))
-        return
-    firsts = tuple(_firsts(moment, action))
-    yield from firsts
-    yield from likelihood(moment, action)
-    yield from regular(moment, action, {first.component for first in firsts})
+@CHOICES.rule("Nothing is expected of {action}, at any step.")
+def earns_nothing(choice: Choice) -> Iterator[Fields]:
+    if _expects_nothing(choice) and not _is_chancy(choice):
+        yield {"action": choice.action}
 
 
-def _nothing(moment: Moment, action: str) -> tuple[Finding, ...]:
-    """Returns what is said where no explicit component differs from zero."""
-    beyond = AllBeyond(action, moment.q_value(action), moment.time_axis.horizon)
-    before = NothingBefore(action, explicit_end(moment, action))
-    claims = (EarnsNothing(action), beyond, before)
-    return tuple(claim for claim in claims if claim.holds(moment))[:1]
+@CHOICES.rule("{action} pays nothing on average at any step, but single episodes differ.")
+def zero_on_average(choice: Choice) -> Iterator[Fields]:
+    if _expects_nothing(choice) and _is_chancy(choice):
+        yield {"action": choice.action}
 
 
-def _firsts(moment: Moment, action: str) -> Iterator["FirstReward"]:
-    """Yields the first reward and the first cost, the earlier one first."""
-    row, notable = undiscounted(moment, action), stands_out(moment, action)
-    either = one_or_nothing(moment, action)
-    places = [np.flatnonzero(notable & (sign * row > 0.0)) for sign in (1.0, -1.0)]
-    for i in sorted(int(place[0]) for place in places if place.size):
-        discounted = float(moment.components(action)[i])
-        effect = _effect(moment, action, i)
-        if i in either:
-            reward, chance = either[i]
-            yield FirstChance(action, effect, i, discounted, abs(reward), chance)
-        elif moment.time_axis.width == 1:
-            yield FirstStepReward(action, effect, i, discounted, float(row[i]))
-        else:
-            yield FirstReward(action, effect, i, discounted)
+@CHOICES.rule("All that {action} pays comes {component:when}: it is worth {value:number} now.")
+def all_beyond(choice: Choice) -> Iterator[Fields]:
+    row, horizon = _row(choice), choice.time_axis.horizon
+    is_told = horizon > 0 and speaks_of_all(choice.moment, choice.action)
+    if is_told and not row[:-1].any() and row[-1] != 0.0:
+        yield {"action": choice.action, "component": horizon, "value": float(row[-1])}
 
 
-def _effect(moment: Moment, action: str, component: int) -> str:
-    """Returns what a component is called: a notable one, if smaller ones of its kind precede it."""
-    row = undiscounted(moment, action)
-    is_preceded = bool((row[:component] * np.sign(row[component]) > 0.0).any())
-    return "notable " * is_preceded + effect_of(row[component])
+@CHOICES.rule("Nothing is expected of {action} {last_step:within}.")
+def nothing_before(choice: Choice) -> Iterator[Fields]:
+    end = explicit_end(choice.moment, choice.action)
+    if end > 0 and not _row(choice)[:end].any():
+        yield {"action": choice.action, "last_step": end * choice.time_axis.width - 1}
 
 
-def _accuracy(moment: Moment, action: str) -> Iterator[Finding]:
-    """Yields what such forecasts are off by, where that matters."""
-    i = largest(moment, action)
-    errors = moment.error_of(action)
-    if errors is not None and not moment.is_exact:
-        error = float(errors[i])
-        if error >= _MATTERS * abs(moment.components(action)[i]):  # not so if it is NaN
-            yield OffBy(action, i, error)
-
-
-def _speaks_of_all(moment: Moment, action: str) -> bool:
-    """Returns whether all components of an action can be told of: trusted, or of an exact table.
-
-    Short episodes of such a table may not have shown what it knows of the residual.
-    """
-    return moment.is_exact or not doubtful(moment, action).any()
-
-
-def _beyond(moment: Moment, action: str) -> Iterator[Finding]:
-    row = moment.components(action)
-    if one_sign(row):
-        beyond = ShareBeyond(action, float(row[-1] / row.sum()), moment.time_axis.horizon)
-        if beyond.share >= _TOO_LITTLE and beyond.holds(moment):
-            yield beyond
-
-
-def _centre(moment: Moment, action: str) -> Iterator[Finding]:
-    end = explicit_end(moment, action)
-    explicit = moment.components(action)[:end]
-    if one_sign(explicit):
-        step = float(explicit @ np.arange(end) / explicit.sum())
-        centre = CentreOfMass(action, end, effect_of(explicit.sum()), step)
-        if centre.holds(moment):
-            yield centre
-
-
-class EarnsNothing(Finding):
-    """No component of an action differs from zero (see `_speaks_of_all`)."""
-
-    action: str
-
-    def holds(self, moment: Moment) -> bool:
-        return not moment.components(self.action).any() and _speaks_of_all(moment, self.action)
-
-
-class AllBeyond(Finding):
-    """All of an action's value lies in the residual (see `_speaks_of_all`)."""
-
-    action: str
-    value: float
-    component: int
-
-    def holds(self, moment: Moment) -> bool:
-        row = moment.components(self.action)
-        at_end = self.component == moment.time_axis.horizon > 0 and _speaks_of_all(
-            moment, self.action
-        )
-        return at_end and not row[:-1].any() and row[-1] != 0.0 and agrees(self.value, row[-1])
-
-
-class NothingBefore(Finding):
-    """No component of an action differs from zero, of those that a forecast speaks of."""
-
-    action: str
-    end: int
-
-    def holds(self, moment: Moment) -> bool:
-        is_nothing = not moment.components(self.action)[: self.end].any()
-        return is_nothing and self.end == explicit_end(moment, self.action) > 0
-
-
-class NextToNothing(Finding):
+@CHOICES.rule("Hardly anything is expected of {action} {last_step:within}.")
+def next_to_nothing(choice: Choice) -> Iterator[Fields]:
     """Some components of those that a forecast speaks of differ from zero, but none stands out."""
-
-    action: str
-    end: int
-
-    def holds(self, moment: Moment) -> bool:
-        row = undiscounted(moment, self.action)
-        little = bool(row.any()) and not stands_out(moment, self.action).any()
-        return little and self.end == explicit_end(moment, self.action)
+    row = undiscounted(choice.moment, choice.action)
+    if row.any() and not stands_out(choice.moment, choice.action).any():
+        yield {"action": choice.action, "last_step": len(row) * choice.time_axis.width - 1}
 
 
-class FirstReward(Finding):
-    """The first component of its sign that stands out; it is notable if smaller ones precede it."""
-
-    action: str
-    effect: str
-    component: int
-    discounted: float
-
-    def holds(self, moment: Moment) -> bool:
-        row, notable = undiscounted(moment, self.action), stands_out(moment, self.action)
-        i = self.component
-        if i >= len(row) or not notable[i]:
-            return False
-        before = notable[:i] & (np.sign(row[:i]) == np.sign(row[i]))
-        return (
-            not before.any()
-            and self.effect == _effect(moment, self.action, i)
-            and agrees(self.discounted, float(moment.components(self.action)[i]))
-        )
+# ---- the first reward, and the first cost ------------------------------------------------------
 
 
-class FirstStepReward(FirstReward):
-    """The same for w = 1, where the discount can be taken out exactly."""
-
-    reward: float
-
-    def holds(self, moment: Moment) -> bool:
-        return (
-            moment.time_axis.width == 1
-            and super().holds(moment)
-            and agrees(self.reward, float(undiscounted(moment, self.action)[self.component]))
-        )
+@CHOICES.rule(
+    "After {action} the first {effect:text} comes {component:when}: {worth:worth}{amount:number}."
+)
+def first_reward(choice: Choice) -> Iterator[Fields]:
+    yield from (told for told in _firsts(choice) if told["is_sure"])
 
 
-class FirstChance(FirstReward):
-    """The same where that step pays, or costs, one amount or nothing."""
-
-    amount: float
-    chance: float
-
-    def holds(self, moment: Moment) -> bool:
-        reward, chance = one_or_nothing(moment, self.action).get(self.component, (0.0, 0.0))
-        return (
-            chance > 0.0
-            and super().holds(moment)
-            and agrees(self.amount, abs(reward))
-            and agrees(self.chance, chance)
-        )
+@CHOICES.rule(
+    "After {action} the first {effect:text} can come {component:when}: {amount:number}, with a "
+    "{chance:percent} chance."
+)
+def first_chance(choice: Choice) -> Iterator[Fields]:
+    """That step pays, or costs, one amount or none."""
+    for told in _firsts(choice):
+        if not told["is_sure"] and len(told["amounts"]) == 1:
+            yield told | {"amount": told["amounts"][0]}
 
 
-class OffBy(Finding):
-    """What forecasts of an action's largest component are off by: the root mean square."""
-
-    action: str
-    component: int
-    error: float
-
-    def holds(self, moment: Moment) -> bool:
-        errors = moment.error_of(self.action)
-        if errors is None or not undiscounted(moment, self.action).any():
-            return False
-        i = largest(moment, self.action)
-        return self.component == i and agrees(self.error, float(errors[i]))
+@CHOICES.rule(
+    "After {action} the first {effect:text} can come {component:when}, with a {chance:percent} "
+    "chance."
+)
+def first_of_several(choice: Choice) -> Iterator[Fields]:
+    """That step pays, or costs, different amounts."""
+    yield from (told for told in _firsts(choice) if len(told["amounts"]) > 1)
 
 
-class CentreOfMass(Finding):
-    """The mean step of an action's rewards before `end`, weighted by what they are worth now.
+@CHOICES.rule(
+    "After {action} the first {effect:text} is expected {component:when}: {worth:worth}"
+    "{amount:number} on average."
+)
+def first_expected(choice: Choice) -> Iterator[Fields]:
+    """It is not known what that step can pay, but for its mean."""
+    for told in _firsts(choice):
+        if not told["is_sure"] and not told["amounts"]:
+            yield told
 
-    There are several that stand out, w = 1, and all have one sign.
+
+FIRSTS = (first_reward, first_chance, first_of_several, first_expected)
+
+
+# ---- how much lies where -----------------------------------------------------------------------
+
+
+@CHOICES.rule("Forecasts of what comes {component:when} are off by about {error:number}.")
+def off_by(choice: Choice) -> Iterator[Fields]:
+    """The root mean square of what forecasts of the largest component are off by, if it matters."""
+    errors, row = choice.moment.error_of(choice.action), _row(choice)
+    if errors is None or choice.moment.is_exact:
+        return
+    if undiscounted(choice.moment, choice.action).any():
+        i = largest(choice.moment, choice.action)
+        if errors[i] >= _MATTERS * abs(row[i]):  # not so if it is NaN
+            yield {"action": choice.action, "component": i, "error": float(errors[i])}
+
+
+@CHOICES.rule("{share:percent} of what {action} is worth comes {component:when}.")
+def share_beyond(choice: Choice) -> Iterator[Fields]:
+    """The share of the residual; all components have one sign."""
+    row, horizon = _row(choice), choice.time_axis.horizon
+    if horizon > 0 and one_sign(row) and speaks_of_all(choice.moment, choice.action):
+        share = float(row[-1] / row.sum())
+        if _TOO_LITTLE <= share < 1.0:
+            yield {"share": share, "action": choice.action, "component": horizon}
+
+
+@CHOICES.rule(
+    "What {action} {pays:text} {last_step:within} comes {step:tenths} steps from now on average."
+)
+def centre_of_mass(choice: Choice) -> Iterator[Fields]:
+    """The mean step of several rewards of one sign, weighted by what they are worth now; w = 1."""
+    end, axis = explicit_end(choice.moment, choice.action), choice.time_axis
+    explicit = _row(choice)[:end]
+    several = np.count_nonzero(stands_out(choice.moment, choice.action)) > 1
+    if several and axis.width == 1 and one_sign(explicit):
+        yield {
+            "action": choice.action,
+            "pays": "pays" if explicit.sum() > 0.0 else "costs",
+            "last_step": end - 1,
+            "step": float(explicit @ np.arange(end) / explicit.sum()),
+        }
+
+
+def one_sign(row: FloatArray) -> bool:
+    """Returns whether shares and means of components make sense: one sign, and not all zero."""
+    return bool(row.any() and ((row >= 0.0).all() or (row <= 0.0).all()))
+
+
+# ---- the numbers -------------------------------------------------------------------------------
+
+
+def _row(choice: Choice) -> FloatArray:
+    return choice.moment.components(choice.action)
+
+
+def _expects_nothing(choice: Choice) -> bool:
+    return not _row(choice).any() and speaks_of_all(choice.moment, choice.action)
+
+
+def _is_chancy(choice: Choice) -> bool:
+    return choice.moment.uncertainty is not None and not choice.moment.is_sure(choice.action)
+
+
+def _firsts(choice: Choice) -> Iterator[Fields]:
+    """Yields the first reward and the first cost that stand out, the earlier one first.
+
+    Where it is known what each step can pay, that is the first step that can pay so; the mean of an
+    earlier one may have another sign. One that smaller ones precede is called clear.
     """
+    moment, axis, action = choice.moment, choice.time_axis, choice.action
+    row, paid = undiscounted(moment, action), outcomes_of(choice)
+    found = []
+    for sign, effect in ((1.0, "reward"), (-1.0, "cost")):
+        part = np.maximum(sign * row, 0.0)  # [K], how much of it is expected at each step
+        if paid:
+            part = np.array([sum(p * max(sign * r, 0.0) for r, p in step.items()) for step in paid])
+        notable = np.flatnonzero((part > 0.0) & (part >= least(moment, action)))
+        if notable.size:
+            i = int(notable[0])
+            effect = "clear " * bool(part[:i].any()) + effect
+            found.append((i, effect, float(part[i]), _chances(paid, i, sign)))
+    for i, effect, mean, chances in sorted(found):
+        chance = min(sum(chances.values()), 1.0)
+        one_for_sure = len(chances) == 1 and chance >= 1.0 - RELATIVE_ZERO
+        yield {
+            "action": action,
+            "effect": effect,
+            "component": i,
+            "worth": axis.width > 1,
+            "amount": mean,
+            "amounts": tuple(sorted(chances)),
+            "chance": chance,
+            "is_sure": one_for_sure if paid else moment.is_sure(action, slice(i, i + 1)),
+        }
 
-    action: str
-    end: int
-    effect: str
-    step: float
 
-    def holds(self, moment: Moment) -> bool:
-        explicit = moment.components(self.action)[: self.end]
-        if self.end != explicit_end(moment, self.action) or not one_sign(explicit):
-            return False
-        return (
-            moment.time_axis.width == 1
-            and int(np.count_nonzero(stands_out(moment, self.action))) > 1
-            and self.effect == effect_of(explicit.sum())
-            and agrees(self.step, float(explicit @ np.arange(self.end) / explicit.sum()))
-        )
-
-
-class ShareBeyond(Finding):
-    """The share of an action's value that lies in the residual; components of one sign only.
-
-    For what has to be trusted, see `_speaks_of_all`.
-    """
-
-    action: str
-    share: float
-    component: int
-
-    def holds(self, moment: Moment) -> bool:
-        row = moment.components(self.action)
-        return (
-            self.component == moment.time_axis.horizon > 0
-            and one_sign(row)
-            and row[-1] != 0.0
-            and _speaks_of_all(moment, self.action)
-            and agrees(self.share, float(row[-1] / row.sum()))
-        )
+def _chances(paid: Sequence[dict[float, float]], i: int, sign: float) -> dict[float, float]:
+    """Returns the amounts of one sign that a step can pay, and the chance of each."""
+    step = paid[i] if paid else {}
+    return {abs(r): p for r, p in step.items() if sign * r > 0.0}

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trdlab.arrays import FloatArray, same
+from trdlab.arrays import RELATIVE_ZERO, BoolArray, FloatArray, same
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, closest
 from trdlab.estimator import Estimator, Future
+from trdlab.explanations.rules import Language
+from trdlab.explanations.words import forms_of
 
 if TYPE_CHECKING:
+    from trdlab.explanations.calibration.calibration import Status
     from trdlab.explanations.calibration.trust import Trust
 
 
@@ -21,7 +24,7 @@ class WhatIf:
     """One quantity of the world that can be varied: γ, or what a source of reward pays.
 
     Args:
-        name: `γ`, or the source, for example `the treasure`.
+        name: `γ`, or the source of reward, for example `the treasure`.
         current: its present value.
         low: the least value to consider.
         high: the largest value to consider.
@@ -39,6 +42,10 @@ class WhatIf:
         q_values = self.q_values(value)
         a, b = float(q_values[action]), float(q_values[foil])
         return 0.0 if same(a, b) else a - b
+
+    def verb(self, of_gamma: str, of_reward: str, of_cost: str) -> str:
+        """Returns the word for what this quantity does: γ is, a source pays or costs."""
+        return of_gamma if self.name == "γ" else of_reward if self.current > 0.0 else of_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +77,9 @@ class Moment:
         policy: `[A]`, the probability of each action under the policy; None if not known.
         totals: `[A]`, undiscounted totals of the same policy, NaN where none exists; None where
             they cannot be known (no exact model).
-        changes_state: `[A]`, whether an action can lead to another state; None if not known.
+        stays: `[A]`, how likely an action leaves the state as it is and pays no more nor less than
+            others that do; None if not known.
+        is_over: whether the episode is over here.
         tied: the names of the optimal actions here, if several tie and their futures differ.
         tied_later: the number of later states where that is so.
         what_ifs: the quantities that can be varied, where there is a model to solve again.
@@ -90,7 +99,8 @@ class Moment:
     future: Future
     policy: FloatArray | None = None
     totals: FloatArray | None = None
-    changes_state: tuple[bool, ...] | None = None
+    stays: tuple[float, ...] | None = None
+    is_over: bool = False
     tied: tuple[str, ...] = ()
     tied_later: int = 0
     what_ifs: tuple[WhatIf, ...] = ()
@@ -147,6 +157,12 @@ class Moment:
         """Returns how far forecasts of such an action can be trusted, if that has been judged."""
         return self.foil_trust if self._is_judged_foil(action) else self.trust
 
+    def status_of(self, action: str) -> "tuple[Status, ...]":
+        """Returns N+1 of good, bad, open or not tested; all not tested where nothing is judged."""
+        trust = self.trust_of(action)
+        nothing: Status = "not tested"
+        return (nothing,) * self.time_axis.num_components if trust is None else trust.status
+
     def error_of(self, action: str) -> FloatArray | None:
         """`[N+1]`: what forecasts of such an action are off by, if that has been judged."""
         return self.foil_error if self._is_judged_foil(action) else self.error
@@ -159,17 +175,28 @@ class Moment:
         """Returns the undiscounted total of one action, NaN where none exists or is known."""
         return float("nan") if self.totals is None else float(self.totals[self.index(action)])
 
-    def ordered(self, action: str, foil: str) -> tuple[str, str]:
-        """Returns the better of two actions, then the other."""
-        return (action, foil) if self.q_value(action) > self.q_value(foil) else (foil, action)
+    def is_sure(self, action: str, components: slice = slice(None)) -> bool:
+        """Returns whether chance has no part in some components of an action, as far as known."""
+        known = self.uncertainty
+        return known is not None and not known.deviation[self.index(action), components].any()
 
-    def pair(self, action: str | None, foil: str | None) -> tuple[str, str | None]:
-        """Returns the action to explain and its foil, filling in what was not asked for.
+    def difference(self, action: str, foil: str) -> FloatArray:
+        """Returns `[N+1]`: action minus foil, exactly 0 where they differ only by rounding."""
+        a, b = self.components(action), self.components(foil)
+        return np.where(_equal(a, b), 0.0, a - b)
 
-        By default these are what the policy does and the best other action. Neither is an action
-        that surely leaves the state as it is: a bump into a wall is worth γ times the best
-        action, often more than any real alternative, and contrasts with nothing. Where no second
-        action changes the state there is no foil.
+    def lead(self, action: str, foil: str) -> FloatArray:
+        """Returns `[N+1]`: how far the action is ahead, rewards summed up to each component."""
+        a, b = self.components(action).cumsum(), self.components(foil).cumsum()
+        return np.where(_equal(a, b), 0.0, self.difference(action, foil).cumsum())
+
+    def choice(self, action: str | None = None, foil: str | None = None) -> "Choice":
+        """Returns an action to explain and another to hold it against, filling in what is not said.
+
+        By default these are what the policy does and the best real alternative: another action that
+        most likely leads to another state, and expects something else if there is such a one. A
+        bump into a wall is worth γ times the best action, often more than any alternative, and
+        contrasts with nothing. Where no other action moves there is no foil.
 
         Raises:
             InputError: there is no such action, or action and foil are the same.
@@ -179,13 +206,51 @@ class Moment:
                 self.index(name)
         if action is not None and action == foil:
             raise InputError(f"Action and foil are both '{action}'.", "Name two different actions.")
-        moving = self.changes_state or (True,) * len(self.action_names)
         likely = np.zeros(len(self.action_names)) if self.policy is None else self.policy
         order = np.lexsort((-self.q_values, -likely))  # by probability, then by value
-        options = [self.action_names[a] for a in order if moving[a]]
-        best = self.action_names[order[0]]
-        action = action or next((name for name in options if name != foil), best)
-        return action, foil or next((name for name in options if name != action), None)
+        names = [self.action_names[a] for a in order]
+        stays = dict(zip(self.action_names, self.stays or [0.0] * len(names), strict=True))
+
+        def alternative(given: str | None) -> str | None:
+            others = [name for name in names if name != given and stays[name] <= 0.5]
+            differ = (o for o in others if given is None or self.difference(given, o).any())
+            return next(differ, next(iter(others), None))
+
+        if action is None:
+            is_free = names[0] != foil
+            action = names[0] if is_free else alternative(foil) or names[1 % len(names)]
+        return Choice(self, action, foil or alternative(action))
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """An action of a moment that is explained, and another one that it is held against.
+
+    Args:
+        moment: what is known of every action.
+        action: the name of one.
+        foil: the name of the other; None where there is none.
+    """
+
+    moment: Moment
+    action: str
+    foil: str | None
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """What the components mean."""
+        return self.moment.time_axis
+
+    @property
+    def orders(self) -> tuple[tuple[str, str], ...]:
+        """Action and foil, and foil and action; empty where there is no foil."""
+        return () if self.foil is None else ((self.action, self.foil), (self.foil, self.action))
+
+
+CHOICES = Language[Choice](
+    "this moment", lambda choice: forms_of(choice.time_axis, choice.moment.seconds_per_step)
+)
+"""What there is to say of a choice."""
 
 
 def moment_of(estimator: Estimator, observation: Any, action_names: Sequence[str]) -> Moment:
@@ -209,3 +274,8 @@ def moment_of(estimator: Estimator, observation: Any, action_names: Sequence[str
     exactly = told.astype(np.float64)  # findings compare sums, and float32 sums differ in order
     decomposition = RewardDecomposition(exactly, estimator.time_axis)
     return Moment(decomposition, tuple(action_names), estimator.future)
+
+
+def _equal(a: FloatArray, b: FloatArray) -> BoolArray:
+    """Returns where two rows of numbers are the same up to rounding."""
+    return np.asarray(np.abs(a - b) <= RELATIVE_ZERO * np.maximum(np.abs(a), np.abs(b)))

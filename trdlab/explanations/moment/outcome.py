@@ -1,20 +1,19 @@
-"""Claims about two actions that were tried: whether what was forecast of them came."""
+"""What came of two actions that were tried, beside what was forecast of them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any
 
 import numpy as np
 
-from trdlab.explanations.claims import Claim, agrees
+from trdlab.explanations.rules import Claim, Fields, Form, Language, every, first, plain_data
+from trdlab.explanations.sections import Section
+from trdlab.explanations.words import forms_of
 from trdlab.rollouts.counterfactual import Counterfactual
-from trdlab.statistics import Estimate
-from trdlab.time_axis import step_label
+from trdlab.statistics import Estimate, enough
 
-IN_ALL = "in all"
 WORTH_SAYING = 0.1
 """The share of Σ|difference| below which a component is not told of."""
-
-Outcome = Literal["came", "missed", "open"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,160 +40,225 @@ class Trial:
         """The name of the other."""
         return self.action_names[self.found.foil]
 
-    @property
-    def scope(self) -> str:
-        """How far rewards were summed: `in all`, or `up to t+3`."""
-        last = self.found.time_axis.num_steps - 1
-        return IN_ALL if self.found.whole else f"up to {step_label(last)}"
+    def gaps(self) -> Iterator[Fields]:
+        """Yields each difference that was forecast, and what came: at components, then in all.
 
-    def gap(self, more: str, less: str, entry: int) -> tuple[float, Estimate]:
-        """Returns more − less of a component, or of the sum at −1: as forecast, and as it came."""
-        said, came = float(self.found.predicted[entry]), self.found.observed[entry]
-        if (more, less) == (self.action, self.foil):
-            return said, came
-        return -said, Estimate(-came.value, -came.high, -came.low)
+        The component of what comes in all is None.
+        """
+        found, names = self.found, (self.action, self.foil)
+        for entry, said in enumerate(found.predicted.tolist()):
+            came = found.observed[entry]
+            if said == 0.0 or np.isnan(came.value):
+                continue
+            more, less = names if said > 0.0 else names[::-1]
+            at = None if entry == len(found.predicted) - 1 else entry
+            came = came if said > 0.0 else -came
+            yield {"more": more, "less": less, "came": came, "said": abs(said), "component": at}
 
-
-class TrialClaim(Claim):
-    """A claim about two actions that were tried."""
-
-    def holds(self, trial: Trial) -> bool:
-        """Returns whether the claim is true of a trial, tested by its definition."""
-        raise NotImplementedError
-
-
-def trial_findings(trial: Trial) -> tuple[TrialClaim, ...]:
-    """Returns whether what was forecast came: how often it was tried, the sum, and when.
-
-    Of the explicit components those are told at which each action was forecast to be furthest
-    ahead of the other.
-    """
-    found, who = trial.found, (trial.action, trial.foil, trial.found.copies)
-    if np.isnan(found.observed.value[-1]):
-        return (NotSeen(*who),)
-    same = found.same_every_time
-    opening = AlwaysTheSame(*who, trial.scope) if same else TriedOften(*who)
-    told = (_told(trial, entry) for entry in (-1, *_furthest(trial)))
-    return (opening, *(claim for claim in told if claim is not None))
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the numbers and the claims as plain data at full precision."""
+        found = self.found
+        return {
+            "action": self.action,
+            "foil": self.foil,
+            "copies": found.copies,
+            "whole": found.whole,
+            "same_every_time": found.same_every_time,
+            "predicted": plain_data(found.predicted),
+            "observed": plain_data(found.observed),
+            "findings": [claim.to_dict() for claim in _told(self)],
+        }
 
 
-def _told(trial: Trial, entry: int) -> TrialClaim | None:
-    """Returns what came of the difference forecast at a component, or of the sum at −1."""
-    ahead = trial.found.predicted[entry] > 0.0
-    more, less = (trial.action, trial.foil) if ahead else (trial.foil, trial.action)
-    said, came = trial.gap(more, less, entry)
-    if said == 0.0 or np.isnan(came.low):  # nothing was forecast, or nothing can be told
-        return None
-    if entry == -1:
-        in_all = {"came": CameInAll, "missed": MissedInAll, "open": OpenInAll}
-        return in_all[_outcome(came)](more, less, came, said, trial.scope)
-    at = {"came": CameAt, "missed": MissedAt, "open": OpenAt}
-    return at[_outcome(came)](more, less, came, said, entry)
+def _forms(trial: Trial) -> dict[str, Form]:
+    axis, whole = trial.found.time_axis, trial.found.whole
+    forms = forms_of(axis, trial.seconds_per_step)
+
+    def at(component: int | None, digits: int) -> str:
+        if component is not None:
+            return " " + forms["when"].show(component, digits)
+        return "" if whole else " " + forms["within"].show(axis.num_steps - 1, digits)
+
+    def paid(component: int | None, is_past: bool) -> str:
+        if component is None and whole:
+            return "was worth" if is_past else "is worth"
+        return "paid" if is_past else "pays"
+
+    return forms | {
+        "at": Form(at),
+        "paid": Form(lambda component, _: paid(component, is_past=True)),
+        "pays": Form(lambda component, _: paid(component, is_past=False)),
+    }
 
 
-class TriedOften(TrialClaim):
-    """How often each action was tried, from copies of one state."""
+TRIALS = Language[Trial]("this trial", _forms)
+rule = TRIALS.rule
 
-    action: str
-    foil: str
-    copies: int
+# ---- how often -----------------------------------------------------------------------------------
 
-    def holds(self, trial: Trial) -> bool:
-        return self._fits(trial) and not trial.found.same_every_time
-
-    def _fits(self, trial: Trial) -> bool:
-        who = (trial.action, trial.foil, trial.found.copies)
-        return (self.action, self.foil, self.copies) == who
+_TRIED = "{action} and {foil} were each tried {copies:times} from here"
 
 
-class AlwaysTheSame(TriedOften):
-    """The same where all copies of an action brought the same, as far as was seen."""
-
-    scope: str
-
-    def holds(self, trial: Trial) -> bool:
-        is_same = trial.found.same_every_time and self.scope == trial.scope
-        return is_same and self._fits(trial)
+def _who(trial: Trial) -> Fields:
+    return {"action": trial.action, "foil": trial.foil, "copies": trial.found.copies}
 
 
-class NotSeen(TriedOften):
-    """The copies were cut off before it was seen what came."""
-
-    def holds(self, trial: Trial) -> bool:
-        return self._fits(trial) and bool(np.isnan(trial.found.observed.value[-1]))
-
-
-class _Gap(TrialClaim):
-    """One action was forecast to pay more than the other; what came of that."""
-
-    outcome: ClassVar[Outcome]
-
-    more: str
-    less: str
-    came: Estimate
-    said: float
-
-    def _fits(self, trial: Trial, entry: int) -> bool:
-        if {self.more, self.less} != {trial.action, trial.foil}:
-            return False
-        said, came = trial.gap(self.more, self.less, entry)
-        claimed = (self.said, self.came.value, self.came.low, self.came.high)
-        true = (said, came.value, came.low, came.high)
-        return all(map(agrees, claimed, true)) and said > 0.0 and _outcome(came) == self.outcome
+@rule(f"{_TRIED}, but cut off before anything could come.")
+def not_seen(trial: Trial) -> Iterator[Fields]:
+    if np.isnan(trial.found.observed.value[-1]):
+        yield _who(trial)
 
 
-class CameInAll(_Gap):
-    """It surely paid more."""
-
-    outcome: ClassVar[Outcome] = "came"
-
-    scope: str
-
-    def holds(self, trial: Trial) -> bool:
-        return self.scope == trial.scope and self._fits(trial, -1)
+@rule(f"{_TRIED}, and each brought the same every time.")
+def always_the_same(trial: Trial) -> Iterator[Fields]:
+    if trial.found.same_every_time:
+        yield _who(trial)
 
 
-class MissedInAll(CameInAll):
-    """It surely did not."""
-
-    outcome: ClassVar[Outcome] = "missed"
-
-
-class OpenInAll(CameInAll):
-    """It may or may not have."""
-
-    outcome: ClassVar[Outcome] = "open"
+@rule(f"{_TRIED}.")
+def tried_often(trial: Trial) -> Iterator[Fields]:
+    if not trial.found.same_every_time:
+        yield _who(trial)
 
 
-class CameAt(_Gap):
-    """It surely paid more at a component: that at which it was forecast to be furthest ahead."""
-
-    outcome: ClassVar[Outcome] = "came"
-
-    component: int
-
-    def holds(self, trial: Trial) -> bool:
-        furthest = self.component in _furthest(trial)
-        return furthest and self._fits(trial, self.component)
+# ---- whether what was forecast came --------------------------------------------------------------
+# `more` is the action that was forecast to be ahead, so what was said is above 0.
 
 
-class MissedAt(CameAt):
-    """It surely did not."""
-
-    outcome: ClassVar[Outcome] = "missed"
-
-
-class OpenAt(CameAt):
-    """It may or may not have."""
-
-    outcome: ClassVar[Outcome] = "open"
+def _includes(came: Estimate, value: float) -> bool:
+    """Returns whether an interval holds a number; where there is no chance, up to rounding."""
+    slack = 1e-9 * max(abs(came.low), abs(came.high))
+    return came.low - slack <= value <= came.high + slack
 
 
-def _outcome(came: Estimate) -> Outcome:
-    return "came" if came.low > 0.0 else "missed" if came.high <= 0.0 else "open"
+@rule("As forecast, {more} {component:paid} {said:number} more than {less}{component:at}.")
+def came_exactly(trial: Trial) -> Iterator[Fields]:
+    """There is no chance, and it is what was forecast."""
+    for gap in trial.gaps():
+        came = gap["came"]
+        if came.low == came.high > 0.0 and _includes(came, gap["said"]):
+            yield gap
 
 
-def _furthest(trial: Trial) -> list[int]:
+@rule(
+    "As forecast, {more} {component:paid} {came:estimate} more than {less}{component:at}; "
+    "{said:number} was forecast."
+)
+def came_as_forecast(trial: Trial) -> Iterator[Fields]:
+    for gap in trial.gaps():
+        is_certain = gap["came"].low == gap["came"].high
+        if gap["came"].low > 0.0 and _includes(gap["came"], gap["said"]) and not is_certain:
+            yield gap
+
+
+@rule(
+    "{more} {component:paid} {came:estimate} more than {less}{component:at}, {than:text} than the "
+    "{said:number} that was forecast."
+)
+def by_another_amount(trial: Trial) -> Iterator[Fields]:
+    for gap in trial.gaps():
+        if gap["came"].low > 0.0 and not _includes(gap["came"], gap["said"]):
+            yield gap | {"than": "more" if gap["came"].low > gap["said"] else "less"}
+
+
+@rule(
+    "{more} {component:paid} at most {most:number} more than {less}{component:at}, less than the "
+    "{said:number} that was forecast."
+)
+def less_than_forecast(trial: Trial) -> Iterator[Fields]:
+    for gap in trial.gaps():
+        came = gap["came"]
+        if came.low <= 0.0 <= came.high < gap["said"] and came.low < came.high:
+            yield gap | {"most": came.high}
+
+
+@rule(
+    "Against the forecast, {less} {component:paid} {ahead:estimate} more than {more}"
+    "{component:at}; {more} was to be {said:number} ahead."
+)
+def against_the_forecast(trial: Trial) -> Iterator[Fields]:
+    for gap in trial.gaps():
+        if gap["came"].high < 0.0:
+            yield gap | {"ahead": -gap["came"]}
+
+
+@rule(
+    "Against the forecast, {more} {component:paid} no more than {less}{component:at}; "
+    "{said:number} more was forecast."
+)
+def no_difference(trial: Trial) -> Iterator[Fields]:
+    for gap in trial.gaps():
+        if gap["came"].low == gap["came"].high == 0.0:
+            yield gap
+
+
+def _open(trial: Trial) -> Iterator[Fields]:
+    """Yields the differences that may have come or not, and how many tries would tell."""
+    for gap in trial.gaps():
+        came, copies = gap["came"], trial.found.copies
+        if came.low <= 0.0 and gap["said"] <= came.high and came.low < came.high:
+            needed = enough(copies, (came.high - came.low) / 2.0, gap["said"])
+            yield gap | {"copies": copies, "enough": needed and max(needed, 2 * copies)}
+
+
+@rule(
+    "Trying each {copies:times} was too few to tell whether {more} {component:pays} more than "
+    "{less}{component:at}; about {enough:count} would do."
+)
+def too_few_tries(trial: Trial) -> Iterator[Fields]:
+    yield from (gap for gap in _open(trial) if gap["enough"] is not None)
+
+
+@rule(
+    "Trying cannot tell whether {more} {component:pays} more than {less}{component:at}: they are "
+    "too close."
+)
+def too_close_to_tell(trial: Trial) -> Iterator[Fields]:
+    yield from (gap for gap in _open(trial) if gap["enough"] is None)
+
+
+# ---- what is told --------------------------------------------------------------------------------
+
+_OUTCOMES = (
+    came_exactly,
+    came_as_forecast,
+    by_another_amount,
+    less_than_forecast,
+    against_the_forecast,
+    no_difference,
+    too_few_tries,
+    too_close_to_tell,
+)
+
+
+def sections(trial: Trial) -> tuple[Section, ...]:
+    """Returns what came of two actions that were tried: in all, when, and how often."""
+    return (Section("trial", "Tried out", _told(trial)),)
+
+
+def in_brief(trial: Trial) -> list[Claim]:
+    """Returns what came in all, and what came against the forecast when; nothing if not seen."""
+    told = [claim for claim in _told(trial) if claim.rule in _OUTCOMES]
+    return [
+        claim for claim in told if claim.component is None or claim.rule is against_the_forecast
+    ][:2]
+
+
+def _told(trial: Trial) -> tuple[Claim, ...]:
+    order, furthest = _outcomes(trial), _furthest(trial)
+    told = [claim for claim in order if claim.component is None or claim.component in furthest]
+    return (*told, *first(trial, not_seen, always_the_same, tried_often))
+
+
+def _outcomes(trial: Trial) -> list[Claim]:
+    """Returns what came in all, and then of each component."""
+    if np.isnan(trial.found.observed.value[-1]):
+        return []
+    found = every(trial, *_OUTCOMES)
+    return sorted(found, key=lambda claim: -1 if claim.component is None else claim.component)
+
+
+def _furthest(trial: Trial) -> set[int]:
     """Returns the components at which each action was forecast to be furthest ahead.
 
     One that holds less than `WORTH_SAYING` of all that differs is not worth a sentence.
@@ -202,4 +266,4 @@ def _furthest(trial: Trial) -> list[int]:
     explicit = trial.found.predicted[: trial.found.time_axis.horizon]
     least = WORTH_SAYING * np.abs(explicit).sum()
     furthest = {int(explicit.argmax()), int(explicit.argmin())} if explicit.size else set()
-    return sorted(i for i in furthest if abs(explicit[i]) >= least)
+    return {i for i in furthest if abs(explicit[i]) >= least}

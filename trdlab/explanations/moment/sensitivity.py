@@ -1,15 +1,17 @@
 """Where a preference flips as γ or a reward varies, the policy re-optimised."""
 
 import math
-from collections.abc import Callable
-from decimal import Decimal
+from collections.abc import Callable, Iterator
+from functools import lru_cache, partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from trdlab.arrays import same
-from trdlab.explanations.claims import Finding, Shown, agrees
-from trdlab.explanations.moment.moment import Moment, WhatIf
+from trdlab.explanations.moment.leads import better_of
+from trdlab.explanations.moment.moment import CHOICES, Choice, WhatIf
+from trdlab.explanations.rules import Claim, Fields, every
+from trdlab.formatting import digits_to_tell, plain, said
 
 SAMPLES = 64
 _PRECISION = 1e-13
@@ -19,28 +21,14 @@ _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 Gap = Callable[[float], float]
 
 
-def what_would_flip(moment: Moment, action: str, foil: str) -> tuple[Finding, ...]:
+def sensitivity(choice: Choice) -> list[Claim]:
     """Returns where the preference flips as each quantity varies, or that it never does.
 
-    The policy is re-optimised at every value. A preference that stays the same but for ties counts
-    as never flipping. Where the actions tie as it is, there is no preference to flip.
-
-    Raises:
-        InputError: there is no such action.
+    The nearest flips come first, those of rewards before that of γ. The policy is re-optimised at
+    every value. A preference that stays the same but for ties counts as never flipping; where the
+    actions tie as it is, there is no preference to flip.
     """
-    i, j = moment.index(action), moment.index(foil)
-    if same(moment.q_value(action), moment.q_value(foil)):
-        return ()
-    found: list[Finding] = []
-    for what_if in moment.what_ifs:
-        name, low, high = what_if.name, what_if.low, what_if.high
-        at = find_flips(lambda x, w=what_if: w.gap(i, j, x), low, high)  # type: ignore[misc]
-        if at:
-            found.append(Flips(action, foil, name, what_if.current, low, high, at))
-        else:
-            better, worse = moment.ordered(action, foil)
-            found.append(NeverFlips(better, worse, name, low, high))
-    return tuple(found)
+    return every(choice, flips, never_flips, several_flips, searched)
 
 
 def find_flips(gap: Gap, low: float, high: float, *, samples: int = SAMPLES) -> tuple[float, ...]:
@@ -131,62 +119,89 @@ def _root(gap: Gap, low: float, high: float, at_low: float, at_high: float) -> f
     return root
 
 
-class Flips(Finding):
-    """The values of one quantity at which the preference between two actions flips."""
-
-    action: str
-    foil: str
-    quantity: str
-    current: float
-    low: float
-    high: float
-    at: tuple[float, ...]
-
-    def holds(self, moment: Moment) -> bool:
-        what_if = _what_if(moment, self.quantity)
-        if what_if is None or not agrees(self.current, what_if.current):
-            return False
-        if not (agrees(self.low, what_if.low) and agrees(self.high, what_if.high)):
-            return False
-        if sorted(self.at) != list(self.at) or not self.at:
-            return False
-        i, j = moment.index(self.action), moment.index(self.foil)
-        signs = [np.sign(what_if.gap(i, j, x)) for x in _around(self, what_if)]
-        return all(a * b < 0 for a, b in zip(signs[::2], signs[1::2], strict=True)) and all(
-            a == b for a, b in zip(signs[1:-1:2], signs[2::2], strict=True)
-        )
+@lru_cache(maxsize=64)
+def _found(choice: Choice) -> tuple[tuple[WhatIf, str, str, tuple[float, ...]], ...]:
+    """Returns, of each quantity, the better action, the worse one and where that flips."""
+    better = next(iter(better_of(choice)), None)
+    if better is None:
+        return ()
+    a, b = better["better"], better["worse"]
+    i, j = choice.moment.index(a), choice.moment.index(b)
+    return tuple(
+        (of, a, b, find_flips(partial(of.gap, i, j), of.low, of.high))
+        for of in choice.moment.what_ifs
+    )
 
 
-class NeverFlips(Finding):
-    """No flip was found: the preference is the same at all sampled values of one quantity."""
-
-    better: str
-    worse: str
-    quantity: str
-    low: float
-    high: float
-
-    def holds(self, moment: Moment) -> bool:
-        what_if = _what_if(moment, self.quantity)
-        if what_if is None:
-            return False
-        if not (agrees(self.low, what_if.low) and agrees(self.high, what_if.high)):
-            return False
-        i, j = moment.index(self.better), moment.index(self.worse)
-        gaps = [what_if.gap(i, j, x) for x in np.linspace(what_if.low, what_if.high, 23)]
-        return min(gaps) >= 0.0 and max(gaps) > 0.0
+def _flips_there(choice: Choice, **claimed: Any) -> bool:
+    """Returns whether the worse action is the better one just beyond each bound of a claim."""
+    of = next(of for of in choice.moment.what_ifs if of.name == claimed["quantity"])
+    i, j = (choice.moment.index(claimed[name]) for name in ("worse", "better"))
+    inside = claimed["inside"]
+    return all(of.gap(i, j, at + (inside - at) * 1e-6) > 0.0 for at in claimed["bounds"])
 
 
-def _what_if(moment: Moment, name: str) -> WhatIf | None:
-    return next((what_if for what_if in moment.what_ifs if what_if.name == name), None)
+@CHOICES.rule(
+    "{worse} would be better if {quantity:text} {were:text} {at:names} instead of "
+    "{present:number}.",
+    holds=_flips_there,
+)
+def flips(choice: Choice) -> Iterator[Fields]:
+    """The nearest values, below and above the present one, at which the other action is better."""
+    for of, better, worse, roots in sorted(_found(choice), key=_change):
+        below = [root for root in roots[::-1] if root < of.current]
+        above = [root for root in roots if root > of.current]
+        for side in (below, above):
+            if side:
+                end = side[1] if len(side) > 1 else of.low if side is below else of.high
+                yield {"better": better, "worse": worse} | _bounds(of, side, (side[0] + end) / 2)
 
 
-def _around(flips: Flips, what_if: WhatIf) -> list[float]:
-    """Returns a value just below and just above each flip, half a unit of its last digit away."""
-    around = []
-    for root in flips.at:
-        half = 1e-7 * max(1.0, abs(root))
-        if isinstance(root, Shown):
-            half = 0.5000001 * 10.0 ** int(Decimal(root.text).as_tuple().exponent)
-        around += [max(root - half, what_if.low), min(root + half, what_if.high)]
-    return around
+@CHOICES.rule("No searched value of {quantity:text} makes {worse} better than {better}.")
+def never_flips(choice: Choice) -> Iterator[Fields]:
+    for of, better, worse, roots in _found(choice):
+        if not roots:
+            yield {"quantity": of.name, "worse": worse, "better": better}
+
+
+@CHOICES.rule("In all, the preference changes where {quantity:text} {is:text} {at:roots}.")
+def several_flips(choice: Choice) -> Iterator[Fields]:
+    """Where there are more flips of one quantity than the nearest."""
+    for of, _, _, roots in _found(choice):
+        if len(roots) > 1:
+            at = tuple(abs(root) for root in roots)
+            yield {"quantity": of.name, "is": of.verb("is", "pays", "costs"), "at": at}
+
+
+@CHOICES.rule(
+    "Searched were {samples:count} values each, with the best policy for each: {ranges:names}."
+)
+def searched(choice: Choice) -> Iterator[Fields]:
+    """Two changes between two neighbouring values can be missed."""
+    found = [of for of, *_ in _found(choice)]
+    if found:
+        ranges = tuple(f"{of.name} from {plain(of.low)} to {plain(of.high)}" for of in found)
+        yield {"samples": SAMPLES + 1, "ranges": ranges}
+
+
+def _change(found: tuple[WhatIf, str, str, tuple[float, ...]]) -> tuple[bool, float]:
+    """Returns by which share a quantity has to change for the preference to flip; γ comes last."""
+    of, _, _, roots = found
+    least = min((abs(root - of.current) for root in roots), default=math.inf)
+    return of.name == "γ", least / abs(of.current) if of.current else math.inf
+
+
+def _bounds(of: WhatIf, side: list[float], inside: float) -> Fields:
+    """Returns how a sentence says for which values of a quantity the preference is another."""
+    nearest, is_more = abs(side[0]), abs(side[0]) > abs(of.current)
+    present, digits = abs(of.current), digits_to_tell([nearest, abs(of.current)])
+    fields = {"quantity": of.name, "present": present, "inside": inside, "bounds": tuple(side[:2])}
+    if len(side) > 1:
+        low, high = sorted((nearest, abs(side[1])))
+        at = (f"{said(low, digits)} and {said(high, digits)}",)
+        return fields | {"were": of.verb("were between", "paid between", "cost between"), "at": at}
+    more, less = (
+        of.verb("were above", "paid more than", "cost more than"),
+        of.verb("were below", "paid less than", "cost less than"),
+    )
+    return fields | {"were": more if is_more else less, "at": (said(nearest, digits),)}

@@ -1,1 +1,13 @@
-"""Pictures: axes in, axes out."""
+"""Pictures: axes in, axes out; `figure` of any noun, and one style, which also saves them."""
+
+from typing import TYPE_CHECKING
+
+from trdlab.lazy import lazily
+
+if TYPE_CHECKING:
+    from trdlab.show.plots.figures import figure
+    from trdlab.show.plots.style import save
+
+__all__ = ["figure", "save"]
+
+__getattr__ = lazily(__name__, {"figure": "figures", "save": "style"})

@@ -1,151 +1,133 @@
-"""The trust report as a matplotlib picture: axes in, axes out."""
+"""How far forecasts can be trusted: the skill of every component, and how often rewards came."""
 
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration.reliability import Reliability
-from trdlab.explanations.calibration.report import TrustReport
+from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.formatting import amount
-from trdlab.show.plots.steps_axis import STEPS, label_steps, positions
+from trdlab.show.plots import bars, style
 from trdlab.time_axis import axis_title, step_label
 
-_SKILL = "#1f4e8c"  # dark, solid, with dots
-_CEILING = "#e39a2d"  # light, dashed
-_MUTED = "#5b6470"
-_TRUSTED = "#dfeade"
-_LOWEST = -0.5  # skill below this is shown as an arrow at the edge
-_GAP = 1.0  # between the explicit components and the residual, in components
+_LOWEST = -0.5  # skill below this is an arrow at the edge; the lowest with its number
+_GROUNDS = {style.TRUSTED: "better than a guess", style.WRONG: "no better", style.OPEN: "open"}
 
 
-def plot_trust(ax: Axes, report: TrustReport) -> Axes:
-    """Draws the skill of every component with its interval, and how far it can be trusted.
+def trust_figure(report: CalibrationReport, title: str = "") -> Figure:
+    """Returns the skill of every component, and how far a forecast can be trusted.
 
-    The trusted range is shaded. Where there was nothing to predict stands a small ring on the line
-    of no skill; where nothing is known or too few episodes tell, a cross. The ceiling, if there is
-    one, is a second line: what lies above it cannot be known.
-
-    Args:
-        ax: the axes to draw on.
-        report: what is drawn.
-
-    Returns:
-        `ax`.
+    Where rewards are either 0 or one amount, how often it came stands below it.
     """
-    axis, found = report.time_axis, report.calibration
-    x = positions(axis, _GAP)
-    _shade(ax, report)
-    ax.axhline(0.0, color="black", linewidth=0.8)
+    found = report.calibration.reliability
+    heading = f"{title}: how far its forecasts can be trusted" if title else ""
+    figure = style.new_figure(4.0 if found is None else 6.8, heading)
+    panels = np.atleast_1d(np.asarray(figure.subplots(1 if found is None else 2, 1)))
+    plot_trust(panels[0], report)
+    if found is not None:
+        plot_reliability(panels[1], found)
+    note = f"{axis_title(report.time_axis)} · {report.judged.episodes} episodes"
+    style.add_legend(figure, _handles(report), note)
+    return figure
+
+
+def plot_trust(ax: Axes, report: CalibrationReport) -> Axes:
+    """Draws the skill of every component with its interval on `ax`, which is returned.
+
+    The ground of a component is green where it has proved better than a constant guess, red where
+    it is surely not, and grey where that is open or was not tested. Where there was nothing to
+    predict stands a small ring on the line of no skill; where nothing is known or too few episodes
+    tell, a cross. The ceiling, if there is one, is a dashed line: what lies above it cannot be
+    known.
+    """
+    found, x = report.calibration, style.positions(report.time_axis, 1.0)
+    for place, colour in zip(x, _grounds(report), strict=True):
+        ax.axvspan(place - 0.5, place + 0.5, color=colour, linewidth=0, zorder=0)
+    ax.axhline(0.0, color=style.MUTED, linewidth=0.8)
     if report.ceiling is not None:
-        limit = report.ceiling.skill
-        _band(ax, x, limit.low, limit.high, _CEILING)
-        _line(ax, x, limit.value, color=_CEILING, linestyle="--", label="a perfect forecast")
-    _band(ax, x, found.skill.low, found.skill.high, _SKILL)
-    _line(ax, x, found.skill.value, color=_SKILL, marker="o", markersize=3, label="this forecast")
-    below = found.skill.value < _LOWEST
-    if below.any():
-        lowest = np.full(below.sum(), _LOWEST)
-        ax.plot(x[below], lowest, "v", color=_SKILL, markersize=6, clip_on=False)
-    constant = found.is_("nothing to predict")
-    _mark(ax, x[constant], "o", "nothing to predict")
-    _mark(ax, x[~constant & ~found.is_("judged")], "x", "not known, or too few episodes")
-    _dress(ax, report, x)
-    return ax
+        _draw_skill(ax, x, report.ceiling.skill, style.MUTED, linestyle="--")
+    _draw_skill(ax, x, found.skill, style.EXPECTED, marker="o", markersize=3.5)
+    below = np.flatnonzero(found.skill.value < _LOWEST)
+    if below.size:
+        ax.plot(x[below], 0.0 * below + _LOWEST, "v", color=style.EXPECTED, clip_on=False)
+        worst = below[found.skill.value[below].argmin()]
+        text = f"down to {style.told(float(found.skill.value[worst]), 1)}"
+        style.note(ax, text, (x[worst], _LOWEST), (-6, 4), ha="right", gid=bars.CUT)
+    for marker, where in zip("ox", _untested(report), strict=True):
+        ax.plot(x[where], 0.0 * x[where], marker, color=style.MUTED, mfc="white", markersize=5)
+    style.label_steps(ax, report.time_axis, x)
+    ax.set(ylim=(_LOWEST, 1.1), yticks=(-0.5, 0.0, 0.5, 1.0), xlabel="steps ahead")
+    ax.set_ylabel("skill (1: perfect,\n0: a constant guess)")
+    last = report.trust.last_step
+    text = "not trusted" if last is None else f"trusted to {step_label(last)}"
+    ax.set_title(text, fontsize=style.TITLE, loc="left")
+    return style.tidy(ax)
 
 
 def plot_reliability(ax: Axes, found: Reliability) -> Axes:
-    """Draws how often a reward came, by the chance that was forecast; on the diagonal all is well.
+    """Draws on `ax` how often a reward came, by the chance that was forecast, and returns it.
 
-    Large dots are all steps together, their area by the number of forecasts; small ones are single
-    steps.
-
-    Args:
-        ax: the axes to draw on.
-        found: what came, for rewards that are either 0 or one amount.
-
-    Returns:
-        `ax`.
+    On the diagonal all is well. Large dots are all steps together, their area by the number of
+    forecasts; small ones are single steps. Forecasts below 0 and above 1 count as 0 and 1.
     """
-    ax.plot([0.0, 1.0], [0.0, 1.0], color=_MUTED, linewidth=0.8, linestyle=":")
-    ax.scatter(found.predicted, found.observed, s=6, color=_MUTED, alpha=0.5, linewidth=0)
+    ax.plot([0.0, 1.0], [0.0, 1.0], color=style.MUTED, linewidth=0.8, linestyle=":")
+    chances = np.clip(found.predicted, 0.0, 1.0)  # [N, bins]
+    ax.scatter(chances, found.observed, s=8, color=style.MUTED, alpha=0.5, linewidth=0)
     count = found.counts.sum(axis=0)  # [bins]
     seen = count > 0
     chance, share = (
-        np.nansum(of * found.counts, axis=0)[seen] / count[seen]
-        for of in (found.predicted, found.observed)
+        np.nansum(of * found.counts, axis=0)[seen] / count[seen] for of in (chances, found.observed)
     )
-    ax.plot(chance, share, color=_SKILL, linewidth=1.0)
-    ax.scatter(chance, share, s=20.0 + 160.0 * count[seen] / count.max(), color=_SKILL, alpha=0.7)
-    ax.set(xlim=(-0.05, 1.05), ylim=(-0.05, 1.05), xticks=(0.0, 0.5, 1.0), yticks=(0.0, 0.5, 1.0))
-    ax.set_aspect("equal")
-    ax.set_xlabel("forecast", fontsize=9, color=_MUTED)
-    ax.set_ylabel("came", fontsize=9, color=_MUTED)
-    ax.set_title(f"chance of the reward of {amount(found.amount)}", fontsize=9, color=_MUTED)
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.tick_params(labelsize=8)
-    return ax
+    ax.plot(chance, share, color=style.EXPECTED, linewidth=1.0)
+    area = 20.0 + 160.0 * count[seen] / count.max()
+    ax.scatter(chance, share, s=area, color=style.EXPECTED, alpha=0.7)
+    ax.set(xlim=(-0.1, 1.1), ylim=(-0.1, 1.1), xticks=(0.0, 0.5, 1.0), yticks=(0.0, 0.5, 1.0))
+    ax.set(aspect="equal", xlabel="chance that was forecast", ylabel="share that came")
+    ax.set_title(f"the reward of {amount(found.amount)}", fontsize=style.TITLE)
+    return style.tidy(ax)
 
 
-def _shade(ax: Axes, report: TrustReport) -> None:
-    trusted = report.trust
-    if trusted.last_step is None:
-        return
-    ax.axvspan(-0.5, trusted.components - 0.5, color=_TRUSTED, linewidth=0, zorder=0)
-    ax.text(
-        -0.4,
-        1.03,
-        f"trusted to {step_label(trusted.last_step)}",
-        fontsize=8,
-        color=_MUTED,
-        va="bottom",
+def _handles(report: CalibrationReport) -> list[Artist]:
+    """Returns what the legend explains: only what is there."""
+    muted: Any = {"colour": style.MUTED}
+    handles: list[Artist] = [bars.handle("this forecast", "-", "o", style.EXPECTED, style.EXPECTED)]
+    if report.ceiling is not None:
+        handles.append(bars.handle("a perfect forecast", "--", **muted))
+    grounds = _grounds(report)
+    handles += [Patch(color=c, label=text) for c, text in _GROUNDS.items() if c in grounds]
+    constant, unknown = _untested(report)
+    handles += [bars.handle("nothing to predict", "", "o", **muted)] * bool(constant.any())
+    handles += [bars.handle("not tested", "", "x", **muted)] * bool(unknown.any())
+    return handles
+
+
+def _untested(report: CalibrationReport) -> tuple[Any, Any]:
+    """Returns two of `[N+1]`: where there was nothing to predict, and where nothing was tested."""
+    found = report.calibration
+    untested = found.is_("not tested")
+    return found.constant & ~untested, untested
+
+
+def _grounds(report: CalibrationReport) -> Any:
+    """Returns `[N+1]`: the colour of the evidence of each component."""
+    found = report.calibration
+    return np.select(
+        [found.is_("good"), found.is_("bad")], [style.TRUSTED, style.WRONG], style.OPEN
     )
 
 
-def _band(ax: Axes, x: FloatArray, low: FloatArray, high: FloatArray, colour: str) -> None:
-    """Draws intervals: a band over the explicit components, a bar at the residual."""
-    low, high = np.maximum(low, _LOWEST), np.maximum(high, _LOWEST)
-    ax.fill_between(x[:-1], low[:-1], high[:-1], color=colour, alpha=0.25, linewidth=0)
+def _draw_skill(ax: Axes, x: FloatArray, skill: Any, colour: str, **how: Any) -> None:
+    """Draws a line and a band through the explicit components; at the residual a point, a bar."""
+    low, high = np.maximum(skill.low, _LOWEST), np.maximum(skill.high, _LOWEST)
+    shown = np.where(skill.value < _LOWEST, np.nan, skill.value)
+    ax.fill_between(x[:-1], low[:-1], high[:-1], color=colour, alpha=0.2, linewidth=0)
+    ax.plot(x[:-1], shown[:-1], linewidth=1.5, color=colour, **how)
     if np.isfinite(low[-1]):
-        ax.vlines(x[-1:], low[-1:], high[-1:], color=colour, alpha=0.5, linewidth=4)
-
-
-def _line(ax: Axes, x: FloatArray, y: FloatArray, *, color: str, **style: Any) -> None:
-    """Draws a line through the explicit components and a point at the residual."""
-    shown = np.where(y < _LOWEST, np.nan, y)
-    ax.plot(x[:-1], shown[:-1], linewidth=1.5, color=color, **style)
+        ax.vlines(x[-1:], low[-1:], high[-1:], color=colour, alpha=0.4, linewidth=4)
     if np.isfinite(shown[-1]):  # a lone NaN would be laid out at the corner of the page
-        ax.plot(x[-1:], shown[-1:], marker="D", markersize=4, color=color)
-
-
-def _mark(ax: Axes, x: FloatArray, marker: str, label: str) -> None:
-    """Marks components that have no skill, on the line of none."""
-    if x.size:
-        ax.scatter(
-            x,
-            np.zeros_like(x),
-            marker=marker,
-            s=24,
-            facecolor="white" if marker == "o" else _MUTED,
-            edgecolor=_MUTED if marker == "o" else None,
-            label=label,
-            zorder=3,
-        )
-
-
-def _dress(ax: Axes, report: TrustReport, x: FloatArray) -> None:
-    axis = report.time_axis
-    label_steps(ax, axis, x)
-    ax.set(xlim=(-0.6, x[-1] + 0.6), ylim=(_LOWEST, 1.12), yticks=(-0.5, 0.0, 0.5, 1.0))
-    ax.set_xlabel(STEPS, fontsize=9, color=_MUTED)
-    ax.set_ylabel("skill (1: perfect,\n0: a constant guess)", fontsize=9, color=_MUTED)
-    ax.set_title(
-        f"{axis_title(axis)} · {report.num_episodes} episodes",
-        fontsize=9,
-        color=_MUTED,
-        loc="right",
-    )
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.tick_params(labelsize=8)
-    ax.legend(loc="upper right", fontsize=8, frameon=False)
+        ax.plot(x[-1:], shown[-1:], marker="D", markersize=4, color=colour)

@@ -1,334 +1,251 @@
-"""Explanations as matplotlib pictures: axes in, axes out.
+"""What is expected of actions at one moment: bars, what they can be off by, and the difference."""
 
-Actions are told apart by hue, lightness and hatching at once, so that pictures survive greyscale
-and colour-blindness. Steps run to the right; the residual stands apart, hatched.
-"""
-
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from trdlab.arrays import FloatArray
-from trdlab.decomposition import TimeAxis
-from trdlab.explanations.moment.leads import difference
+from trdlab.decomposition import RewardDecomposition
+from trdlab.estimator import Estimator, Future
 from trdlab.explanations.moment.moment import Moment
-from trdlab.files import check_output, write_whole
-from trdlab.formatting import amount, decimals_for, number, plain
-from trdlab.gridworld import Gridworld
-from trdlab.gridworld.gridmap import MOVES
-from trdlab.gridworld.render import draw_map
-from trdlab.show.gridworld import GridworldReport
-from trdlab.show.plots.steps_axis import STEPS, label_steps, positions, share_scale
-from trdlab.show.report import Report, Scene
+from trdlab.explanations.moment.outcome import Trial
+from trdlab.explanations.moment.steps import doubtful
+from trdlab.formatting import decimals_between, decimals_for
+from trdlab.show.plots import bars, style
+from trdlab.show.plots.bars import Scale, plot_components, scale_of, settled
 from trdlab.tabular import ExactTable
+from trdlab.time_axis import axis_title
 
-PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
+__all__ = ["moment_figure", "plot_action", "plot_components", "plot_contrast", "plot_moment"]
 
-_ACTION = "#1f4e8c"  # dark; its route is solid
-_FOIL = "#e39a2d"  # light; its route is dashed
-_MUTED = "#5b6470"
-_POLICY = "#2f7d4f"
-_MOST_NUMBERS = 9  # written at the bars
-_MOST_LABELS = 12
-_MOST_ROUTE_STEPS = 1_000
-_POINT = 1.25 / 330  # a point of a line's height, as a share of the panel's
-
-
-def check_picture(path: Path, *, overwrite: bool = False) -> None:
-    """Checks that a picture can be written to a path.
-
-    Raises:
-        OutputError: unknown ending, no such folder, not writable, or the file exists.
-    """
-    check_output(path, PICTURE_SUFFIXES, overwrite=overwrite)
+Range = tuple[float, float]
+"""The least and the largest value that is possible."""
+ANY: Range = (-np.inf, np.inf)
+PANEL = 1.75
+"""Inches that one row of bars takes."""
+EXPECTED = "expected discounted reward"
 
 
-def save_report(report: Report, path: Path) -> None:
-    """Writes the picture of a report; the ending of `path` says in which format.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    figure = report_figure(report)
-    write_whole(path, lambda temporary: figure.savefig(temporary, dpi=160))
-
-
-def report_figure(report: Report) -> Figure:
-    """Returns the picture of a report: the map with its routes, the bars, the contrast."""
-    moment, axis = report.explanation.moment, report.table.time_axis
-    action, foil = report.explanation.action, report.explanation.foil
-    layout = ConstrainedLayoutEngine(rect=(0.0, 0.04, 1.0, 0.96))  # the foot of the page is free
-    figure = Figure(figsize=(11.0, 5.8), layout=layout)
-    figure.suptitle(report.scene.caption, fontsize=12)
-    panels: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.35))
-    left, right = panels
-    map_ax = left.subplots()
-    if isinstance(report, GridworldReport):
-        plot_map(map_ax, report.world, report.table, report.state, action, foil)
-    else:
-        plot_scene(map_ax, report.scene, report.state)
-    names = [action] if foil is None else [action, foil]
-    axes: list[Axes] = list(
-        np.atleast_1d(right.subplots(len(names) + (foil is not None), 1, sharex=True))
-    )
-    for ax, name, colour in zip(axes, names, (_ACTION, _FOIL), strict=False):
-        plot_components(ax, moment.components(name), axis, colour=colour)
-        plot_uncertainty(ax, moment, name)
-        ax.set_title(_title(moment, name), fontsize=10, loc="left")
-    if foil is not None:
-        plot_contrast(axes[-1], moment, action, foil)
-        for ax in axes[:-1]:
-            ax.label_outer()
-        share_scale(axes[:-1])
-    right.supylabel("expected discounted reward", fontsize=9, color=_MUTED)
-    meaning = whiskers(moment)
-    figure.text(
-        0.5,
-        0.012,
-        f"γ = {plain(axis.gamma)}, N = {axis.horizon}, w = {axis.width} · after the first action "
-        f"the future of {moment.future.policy} · {moment.future.reward} · ends at "
-        f"{moment.future.ending}{meaning and f' · {meaning}'}",
-        fontsize=8,
-        color=_MUTED,
-        ha="center",
-    )
+def moment_figure(
+    moment: Moment,
+    action: str,
+    foil: str | None = None,
+    title: str = "",
+    *,
+    trial: Trial | None = None,
+    possible: Range = ANY,
+) -> Figure:
+    """Returns the picture of an action, or of two and their difference (see `plot_moment`)."""
+    panels = 1 if foil is None else 3
+    figure = style.new_figure(1.6 + PANEL * panels, title)
+    axes = np.atleast_1d(figure.subplots(panels, 1, sharex=True)).tolist()
+    plot_moment(axes, moment, action, foil, trial=trial, possible=possible)
+    figure.supylabel(EXPECTED, fontsize=style.TEXT, color=style.MUTED)
+    explain_marks(figure, moment, action, foil, trial)
     return figure
 
 
-def plot_map(
-    ax: Axes, world: Gridworld, table: ExactTable, state: int, action: str, foil: str | None = None
+def plot_moment(
+    axes: Sequence[Axes],
+    moment: Moment,
+    action: str,
+    foil: str | None = None,
+    *,
+    trial: Trial | None = None,
+    possible: Range = ANY,
+) -> Sequence[Axes]:
+    """Draws an action; with a foil, both on one scale, and their difference below them.
+
+    Args:
+        axes: one, or three that share their steps.
+        moment: the decompositions.
+        action: the name of an action.
+        foil: the name of another.
+        trial: what came of the two, where they were tried.
+        possible: the values that a component can have; whiskers end there.
+
+    Returns:
+        `axes`.
+    """
+    names = [action] if foil is None else [action, foil]
+    values = [moment.q_value(name) for name in names]
+    decimals = decimals_for(values) if foil is None else decimals_between(*values)
+    ends = [_ends(moment, name, possible) for name in names]
+    scale = scale_of(np.stack([moment.components(name) for name in names]), *ends)
+    for ax, name, value in zip(axes, names, values, strict=False):
+        plot_action(ax, moment, name, scale=scale, possible=possible)
+        _title(ax, f"{name}: Q = {style.told(value, decimals)}", moment.components(name))
+    if foil is not None:
+        plot_contrast(axes[-1], moment, action, foil, trial=trial)
+        delta = settled(moment.difference(action, foil))
+        gap = style.told(float(delta.sum()), decimals_for([delta.sum()]))
+        _title(axes[-1], f"{action} − {foil}: {gap}", delta)
+    for ax in axes[:-1]:
+        ax.tick_params(labelbottom=False)
+    axes[-1].set_xlabel(style.STEPS)
+    return axes
+
+
+def plot_action(
+    ax: Axes, moment: Moment, action: str, *, scale: Scale | None = None, possible: Range = ANY
 ) -> Axes:
-    """Draws a state of a gridworld, the policy, and the route that each action leads to.
+    """Draws what is expected of an action, with whiskers (see `whiskers`).
 
-    A route follows the likeliest outcome of the action, then of the policy's likeliest actions,
-    until the episode ends or comes back to where it was.
-
-    Args:
-        ax: the axes to draw on.
-        world: the gridworld.
-        table: its table; the routes follow its policy.
-        state: the index of the state.
-        action: the name of the explained action; its route is solid.
-        foil: the name of its foil; its route is dashed.
-
-    Returns:
-        `ax`.
-    """
-    draw_map(ax, world, state)
-    _plot_policy(ax, world, table, state)
-    solid, dashed = (action, _ACTION, "-", -0.12), (foil, _FOIL, (0, (3, 1.5)), 0.12)
-    for name, colour, line, offset in (dashed, solid) if foil else (solid,):
-        states = route(table, state, world.action_names.index(name))
-        places = [world.states[s].place for s in states]
-        x = [column + 0.5 + offset for _, column in places]
-        y = [row + 0.5 + offset for row, _ in places]
-        ax.plot(x, y, color=colour, linestyle=line, linewidth=2.5, zorder=5, label=name)
-        if len(places) > 1:
-            ax.annotate(
-                "",
-                (x[-1], y[-1]),
-                (x[-2], y[-2]),
-                arrowprops={"arrowstyle": "-|>", "color": colour, "mutation_scale": 16},
-                zorder=6,
-            )
-    ax.legend(
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.02),
-        ncols=2,
-        frameon=False,
-        title="route after (wedges: the policy)",
-        fontsize=9,
-        title_fontsize=8,
-        reverse=True,
-    )
-    return ax
-
-
-def plot_scene(ax: Axes, scene: Scene, state: int) -> Axes:
-    """Writes the map of a state as text, with its legend.
-
-    Args:
-        ax: the axes to write on.
-        scene: the world and the state.
-        state: the index of the state.
-
-    Returns:
-        `ax`.
-    """
-    ax.axis("off")
-    lines = scene.drawing.splitlines()
-    size = min(26.0, 280.0 / max([1, *map(len, lines)]))
-    ax.text(0.5, 1.0, scene.drawing, family="monospace", fontsize=size, ha="center", va="top")
-    below = 0.95 - len(lines) * size * _POINT
-    words = [f"state {state}", scene.place, "", *scene.legend]
-    ax.text(0.5, below, "\n".join(words), ha="center", va="top", linespacing=1.4)
-    return ax
-
-
-def _plot_policy(ax: Axes, world: Gridworld, table: ExactTable, state: int) -> None:
-    """Draws a small wedge at the edge of each cell through which the policy leaves it."""
-    here = world.states[state]
-    for index, at in enumerate(world.states):
-        if at.collected != here.collected or world.is_terminal(index):
-            continue
-        for action, (down, right) in enumerate(MOVES):
-            if table.solution.policy[index, action] > 0.0:
-                x, y = at.column + 0.5 + 0.42 * right, at.row + 0.5 + 0.42 * down
-                tip, side = (0.07 * right, 0.07 * down), (0.09 * down, 0.09 * right)
-                wedge = [
-                    (x + tip[0], y + tip[1]),
-                    (x - side[0], y - side[1]),
-                    (x + side[0], y + side[1]),
-                ]
-                ax.fill(*zip(*wedge, strict=True), color=_POLICY, linewidth=0, zorder=4)
-
-
-def route(table: ExactTable, state: int, action: int) -> list[int]:
-    """Returns the states of the likeliest episode that begins with an action, until it repeats.
-
-    Args:
-        table: the model, and the policy to follow.
-        state: where it begins.
-        action: the index of the first action.
-    """
-    mdp, policy = table.mdp, table.solution.policy
-    states = [state]
-    for _ in range(_MOST_ROUTE_STEPS):
-        row = states[-1] * mdp.num_actions + action
-        outcomes = slice(mdp.offsets[row], mdp.offsets[row + 1])
-        likeliest = mdp.offsets[row] + int(mdp.probabilities[outcomes].argmax())
-        following = int(mdp.next_states[likeliest])
-        ended = bool(mdp.terminated[likeliest])
-        if following in states[1:]:
-            return [*states, following]
-        if following != states[-1]:
-            states.append(following)
-        if ended:
-            break
-        action = int(policy[following].argmax())
-    return states
-
-
-def plot_components(ax: Axes, components: FloatArray, axis: TimeAxis, *, colour: str) -> Axes:
-    """Draws a bar per component: explicit ones filled, the residual hatched and set apart.
+    What is not to be trusted is pale. Where the episode may end meanwhile, a dotted line is the
+    chance that it is still running, with a scale of its own on the right.
 
     Args:
         ax: the axes to draw on.
-        components: `[N+1]`.
-        axis: what they mean.
-        colour: the colour of the bars.
-
-    Returns:
-        `ax`.
-    """
-    places = positions(axis)
-    ax.bar(places[:-1], components[:-1], color=colour, width=0.8)
-    ax.bar(places[-1:], components[-1:], fc="white", ec=colour, hatch="////", width=0.8)
-    ax.axhline(0.0, color="black", linewidth=0.8)
-    decimals = decimals_for(components)
-    if axis.num_components <= _MOST_NUMBERS:
-        for x, y in zip(places, components, strict=True):
-            ax.annotate(
-                number(float(y), decimals),
-                (x, y),
-                xytext=(0, 2 if y >= 0 else -2),
-                textcoords="offset points",
-                ha="center",
-                va="bottom" if y >= 0 else "top",
-                fontsize=8,
-                bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.6},
-                zorder=5,
-            )
-    label_steps(ax, axis, places)
-    ax.set_xlabel(STEPS, fontsize=9, color=_MUTED)
-    ax.margins(y=0.2)
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.tick_params(labelsize=8)
-    return ax
-
-
-def plot_uncertainty(ax: Axes, moment: Moment, action: str) -> Axes:
-    """Adds whiskers to an action's bars, and the chance of still being alive where it is known.
-
-    A whisker is one standard deviation of the reward; where that is not known, what such forecasts
-    are off by (see `whiskers`). Survival is a thin line of steps, read on the right; it is left out
-    where the episode cannot end within the components.
-
-    Args:
-        ax: the axes with the bars.
         moment: the decompositions, and their uncertainty or error.
         action: the name of the action.
+        scale: what the axes show; by default all bars of this action.
+        possible: the values that a component can have; whiskers end there.
 
     Returns:
         `ax`.
     """
-    a, places = moment.index(action), positions(moment.time_axis)
-    means, length = moment.components(action), _lengths(moment)[a]
-    shown = length > 0.0  # not so if it is NaN
-    ax.errorbar(places[shown], means[shown], length[shown], fmt="none", ecolor="black", capsize=2.0)
-    if moment.uncertainty is not None and moment.uncertainty.survival[a, -1] < 1.0:
-        right = ax.twinx()
-        right.step(
-            places, moment.uncertainty.survival[a], where="mid", color=_POLICY, linewidth=1.0
-        )
-        right.set(ylim=(0.0, 1.15), yticks=(0.0, 0.5, 1.0))
-        right.set_ylabel("still running", fontsize=8, color=_POLICY)
-        right.tick_params(labelsize=7, colors=_POLICY)
-        right.spines[["top", "left"]].set_visible(False)
+    components, ends = moment.components(action), _ends(moment, action, possible)
+    scale = scale_of(components[None], ends) if scale is None else scale
+    colour = style.action_colours(moment.action_names)[action]
+    faded = doubtful(moment, action)
+    plot_components(ax, components, moment.time_axis, colour=colour, scale=scale, faded=faded)
+    if ends is not None:
+        bars.draw_whiskers(ax, style.positions(moment.time_axis), ends, scale)
+    chance = _survival(moment, action)
+    if (chance < 1.0).any():
+        _plot_survival(ax, style.positions(moment.time_axis), chance)
     return ax
 
 
-def whiskers(moment: Moment) -> str:
-    """Returns what the whiskers of `plot_uncertainty` mean, empty where there are none."""
-    if not (_lengths(moment) > 0.0).any():
-        return ""
-    if moment.uncertainty is not None:
-        return "whiskers: one standard deviation"
-    return "whiskers: what such forecasts are off by (root mean square)"
-
-
-def _lengths(moment: Moment) -> FloatArray:
-    """Returns `[A, N+1]`: how long whiskers are, 0 or NaN where there are none."""
-    if moment.uncertainty is not None:
-        return moment.uncertainty.deviation
-    none = np.zeros(moment.time_axis.num_components)
-    errors = [moment.error_of(action) for action in moment.action_names]
-    return np.stack([none if error is None else error for error in errors])
-
-
-def plot_contrast(ax: Axes, moment: Moment, action: str, foil: str) -> Axes:
-    """Draws action minus foil, component by component: up where the action pays more.
+def plot_contrast(
+    ax: Axes, moment: Moment, action: str, foil: str, *, trial: Trial | None = None
+) -> Axes:
+    """Draws action minus foil: up, and in the colour of the action, where that pays more.
 
     Args:
         ax: the axes to draw on.
         moment: the decompositions.
         action: the name of an action.
         foil: the name of another.
+        trial: of both; what came of their difference is drawn as diamonds.
 
     Returns:
         `ax`.
     """
-    delta = difference(moment, action, foil)
-    plot_components(ax, delta, moment.time_axis, colour=_MUTED)
-    for bar, value in zip(ax.patches, delta, strict=False):
-        colour = _ACTION if value > 0 else _FOIL
-        bar.set_edgecolor(colour)
-        if bar.get_hatch() is None:
-            bar.set_facecolor(colour)
-    gap = moment.q_value(action) - moment.q_value(foil)
-    ax.set_title(f"{action} − {foil}: {_short(gap)} in all", fontsize=10, loc="left")
+    delta, axis = settled(moment.difference(action, foil)), moment.time_axis
+    came = None if trial is None else _came(trial)
+    scale, colours = scale_of(delta[None], came), style.action_colours(moment.action_names)
+    faded = doubtful(moment, action) | doubtful(moment, foil)
+    colour = (colours[action], colours[foil])
+    plot_components(ax, delta, axis, colour=colour, scale=scale, faded=faded)
+    if came is not None:
+        bars.draw_whiskers(ax, style.positions(axis) + 0.2, came[1:], scale, came[0])
     return ax
 
 
-def _title(moment: Moment, action: str) -> str:
-    total = moment.total(action)
-    undiscounted = "" if np.isnan(total) else f", {amount(total)} undiscounted"
-    return f"{action}: Q = {_short(moment.q_value(action))}{undiscounted}"
+def explain_marks(
+    figure: Figure, moment: Moment, action: str, foil: str | None, trial: Trial | None = None
+) -> None:
+    """Adds a legend of the marks that are there, and says whose future it is."""
+    names = [action] if foil is None else [action, foil]
+    handles: list[Artist] = [bars.residual_handle()]
+    if any(doubtful(moment, name).any() for name in names):
+        handles.append(bars.faded_handle())
+    if meaning := whiskers(moment):
+        handles.append(bars.handle(f"whiskers: {meaning}"))
+    if any((_survival(moment, name) < 1.0).any() for name in names):
+        label = "chance that the episode is still running"
+        handles.append(bars.handle(label, ":", colour=style.MUTED))
+    if trial is not None:
+        handles.append(bars.handle(f"as it came, each tried {trial.found.copies} times", "", "D"))
+    future, usual = moment.future, Future("")
+    whose = [f"after the first action: {future.policy}"]
+    whose += [future.reward] * (future.reward != usual.reward)
+    whose += [f"ends at {future.ending}"] * (future.ending != usual.ending)
+    style.add_legend(figure, handles, axis_title(moment.time_axis), " · ".join(whose))
 
 
-def _short(value: float) -> str:
-    return number(value, decimals_for([value]))
+def whiskers(moment: Moment) -> str:
+    """Returns what the whiskers of a moment mean, empty where there are none."""
+    if not any((_lengths(moment, name) > 0.0).any() for name in moment.action_names):
+        return ""
+    if moment.uncertainty is not None:
+        return "one standard deviation"
+    return "what such forecasts are off by (root mean square)"
+
+
+def without_noise(moment: Moment, error: float) -> Moment:
+    """Returns a moment in which all that is within a proven error is 0, variances too."""
+    told, known = moment.decomposition, moment.uncertainty
+    if known is not None:
+        spread = np.where(known.deviation**2 <= error, 0.0, known.deviation)
+        known = replace(known, deviation=spread)
+    components = settled(told.components, error)
+    return replace(
+        moment,
+        decomposition=RewardDecomposition(components, told.time_axis),
+        uncertainty=known,
+    )
+
+
+def possible_range(estimator: Estimator) -> Range:
+    """Returns the values that components can have: of one sign where all rewards surely are."""
+    if not isinstance(estimator, ExactTable):
+        return ANY
+    rewards = estimator.mdp.rewards
+    return 0.0 if (rewards >= 0.0).all() else ANY[0], 0.0 if (rewards <= 0.0).all() else ANY[1]
+
+
+def _title(ax: Axes, text: str, components: FloatArray) -> None:
+    """Writes the title of bars, above their numbers if there are any."""
+    pad = 20.0 if bars.numbers(settled(components)) else 6.0
+    ax.set_title(text, fontsize=style.TITLE, loc="left", pad=pad)
+
+
+def _survival(moment: Moment, action: str) -> FloatArray:
+    """Returns `[N+1]`: the chance that the episode still runs, 1 where it is not known."""
+    known = moment.uncertainty
+    ones = np.ones(moment.time_axis.num_components)
+    return ones if known is None else np.asarray(known.survival[moment.index(action)])
+
+
+def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:
+    right = ax.twinx()
+    right.step(places, chance, where="mid", color=style.MUTED, linewidth=1.2, linestyle=":")
+    right.set(ylim=(-0.08, 1.2), yticks=(0.0, 0.5, 1.0), yticklabels=("0", "½", "1"))
+    style.tidy(right).tick_params(labelcolor=style.MUTED)
+    right.spines[["left", "bottom"]].set_visible(False)
+    ax.set_zorder(right.get_zorder() + 1)  # the bars stand in front of it
+    ax.patch.set_visible(False)
+
+
+def _lengths(moment: Moment, action: str) -> FloatArray:
+    """Returns `[N+1]`: how long whiskers are, 0 or NaN where there are none."""
+    if moment.uncertainty is not None:
+        return np.asarray(moment.uncertainty.deviation[moment.index(action)])
+    error = moment.error_of(action)
+    return np.zeros(moment.time_axis.num_components) if error is None else error
+
+
+def _ends(moment: Moment, action: str, possible: Range) -> FloatArray | None:
+    """Returns `[2, N+1]`: where whiskers end, NaN where there are none; None if there are none."""
+    means, length = moment.components(action), _lengths(moment, action)
+    if not (length > 0.0).any():
+        return None
+    least, most = possible
+    if moment.only_reward is not None:
+        least, most = (0.0, most) if moment.only_reward > 0.0 else (least, 0.0)
+    low = np.minimum(np.maximum(means - length, least), means)
+    high = np.maximum(np.minimum(means + length, most), means)
+    return np.where(length > 0.0, np.stack([low, high]), np.nan)
+
+
+def _came(trial: Trial) -> FloatArray:
+    """Returns `[3, N+1]`: what came of a difference, and its interval, of no length if unknown."""
+    seen = trial.found.observed
+    rows = np.stack([seen.value, seen.low, seen.high])[:, :-1]
+    return np.where(np.isnan(rows), rows[0], rows)

@@ -5,9 +5,15 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
 
-from trdlab.files import write_whole
 from trdlab.runs import read_metrics
+from trdlab.show.plots import style
+
+_SHADES = LinearSegmentedColormap.from_list("agents", style.AGENTS)
+_LINES = ("-", "--", ":", "-.")
 
 
 def learning_curves(
@@ -20,34 +26,27 @@ def learning_curves(
         runs: lines of metrics (see `trdlab.runs.read_metrics`) by what to call the run.
         value: which metric; lines that do not have it are left out.
     """
-    for name, rows in runs.items():
-        told = [row for row in rows if row.get(value) is not None]
-        ax.plot([row["agent_steps"] for row in told], [row[value] for row in told], label=name)
-    ax.set_xlabel("agent steps")
-    ax.set_ylabel("mean return of the last 100 episodes" if value == "score" else value)
-    ax.xaxis.set_major_formatter(lambda steps, _: f"{steps:,.0f}")
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.grid(alpha=0.3)
-    if runs:
-        ax.legend(frameon=False)
-    return ax
+    for i, (name, rows) in enumerate(runs.items()):
+        told = [(row["agent_steps"], row[value]) for row in rows if row.get(value) is not None]
+        steps, values = zip(*told, strict=True) if told else ((), ())
+        shade, marker = _SHADES(i / max(len(runs) - 1, 1)), "o" if len(told) == 1 else ""
+        ax.plot(steps, values, _LINES[i % 4], color=shade, marker=marker, label=name)
+    ax.set(xlabel="agent steps", ylabel=value)
+    ax.xaxis.set_major_formatter(EngFormatter(sep=""))
+    ax.grid(axis="y", alpha=0.3)
+    return style.tidy(ax)
 
 
-def save_learning_curves(folders: Sequence[Path], path: Path) -> None:
-    """Writes a picture of the scores of some runs.
-
-    Args:
-        folders: of the runs; one without metrics is left out.
-        path: the picture.
+def curves_figure(folders: Sequence[Path]) -> Figure:
+    """Returns the picture of the scores of the runs in some folders, of those with metrics.
 
     Raises:
-        OutputError: it cannot be written.
         TrdlabError: a file of metrics is torn.
     """
-    from matplotlib.figure import Figure
-
     files = {folder.name: folder / "metrics.jsonl" for folder in folders}
     rows = {name: read_metrics(file) for name, file in files.items() if file.exists()}
-    figure = Figure(figsize=(8, 4.5), layout="constrained")
-    learning_curves(figure.add_subplot(), rows)
-    write_whole(path, lambda temporary: figure.savefig(temporary, dpi=150))
+    figure = style.new_figure(3.6 + 0.2 * len(rows))
+    ax = learning_curves(figure.subplots(), rows)
+    lines, _ = ax.get_legend_handles_labels()
+    style.add_legend(figure, lines, "score: mean return of the last 100 episodes")
+    return figure

@@ -1,0 +1,307 @@
+"""How two actions are held against each other, in numbers worked out by hand and in words."""
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from moments import GAMMA, choice, moment, of_kind, said, told
+from trdlab.decomposition import TimeAxis
+from trdlab.errors import InputError
+from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations.moment.exact import gridworld_moment
+from trdlab.explanations.moment.moment import Choice, moment_of
+from trdlab.explanations.moment.telling import in_brief
+from trdlab.gridworld import Gridworld, load_map, parse_map
+from trdlab.tabular import exact, learn
+
+
+def test_the_drone_prefers_down_because_it_pays_sooner():
+    of = choice()
+    assert (of.action, of.foil) == ("down", "up")
+    sooner, discount, first, flip = in_brief(of)
+    assert sooner.sentence == (
+        "Down gives more immediate rewards: 2.71 within 4 steps, where up gives nothing."
+    )
+    assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
+    assert discount.sentence == (
+        "Both pay 4 in total, but each step of waiting makes a reward count 5 % less: down is "
+        "worth 3.52, up 3.26."
+    )
+    assert discount.better_value == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4)
+    assert discount.worse_value == pytest.approx(4 * GAMMA**4)
+    assert first.sentence == "After down the first reward comes in 1 step: 1."
+    assert flip.sentence == "Up would be better if each coin paid less than 0.924 instead of 1."
+
+
+def test_the_fewest_steps_that_justify_down_are_those_of_its_three_coins():
+    (reasons,) = of_kind(choice(), "reasons")
+    # against them stand 3 γ⁴ of the treasure; two coins are not enough
+    assert reasons.components == (1, 2, 3)
+    assert reasons.advantage == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
+    assert reasons.disadvantage == pytest.approx(3 * GAMMA**4)
+    assert reasons.sentence == (
+        "What comes in 1 to 3 steps is enough to prefer down: 2.71 more there, against 2.44 for "
+        "up elsewhere."
+    )
+
+
+def test_the_default_foil_is_a_real_alternative():
+    of = choice()
+    values = dict(zip(of.moment.action_names, of.moment.q_values, strict=True))
+    assert values["left"] > values["up"]  # a bump is worth γ·Q(down), more than the foil
+    assert choice(action="up").foil == "down"
+    assert choice(foil="down").action == "up"
+    assert choice("bridge").foil == "right"  # over the bridge; a bump may slip, but mostly stays
+    identical = choice("windy")
+    assert not identical.moment.difference("down", "right").any()
+    assert identical.foil not in (None, "right")
+
+
+def test_the_action_is_what_the_policy_does_even_if_that_is_to_stay():
+    world = Gridworld(parse_map("H = hazard -1 terminal\n---\nSH"))
+    of = choice(world)
+    assert of.moment.policy is not None
+    assert of.moment.policy[of.moment.index(of.action)] == 1.0
+    assert of.action != "right"
+    assert of.foil == "right"
+    assert said(of, "decided-at") == [
+        f"What decides comes now: {of.action} pays nothing and right costs 1."
+    ]
+
+
+def test_without_another_action_that_moves_there_is_nothing_to_compare():
+    of = choice("corridor")
+    assert (of.action, of.foil) == ("right", None)
+    assert in_brief(of)[0].sentence == (
+        "All other actions stay here, or most likely do, so there is nothing to compare."
+    )
+
+
+def test_to_fall_off_a_cliff_is_no_bump():
+    cliff = Gridworld(parse_map("C = hazard -100\nT = treasure 1 terminal\n---\n..T\nSC."))
+    of = choice(cliff, action="up", foil="right")
+    assert of.moment.stays is not None
+    assert of.moment.stays[of.moment.index("left")] == 1.0
+    (decided,) = of_kind(of, "decided-at")
+    assert decided.component == 0
+    assert decided.sentence == "What decides comes now: up pays nothing and right costs 100."
+
+
+def test_where_the_episode_is_over_that_is_all_there_is_to_say():
+    world = Gridworld(parse_map("T = treasure 1 terminal\n---\nS.T"))
+    over = int(np.flatnonzero(world.mdp.terminal_states)[0])
+    assert [claim.sentence for claim in told(choice(world, state=over))] == [
+        "The episode is over here: no action pays anything any more."
+    ]
+
+
+@pytest.mark.parametrize("slip", [0.1, 0.3])
+def test_nothing_is_expected_of_a_world_that_pays_nothing(slip: float):
+    world = Gridworld(parse_map(f"E = coin 0 terminal\nslip: {slip}\n---\n...\nSE."))
+    assert [claim.sentence for claim in in_brief(choice(world))] == [
+        "Nothing is expected of any action here."
+    ]
+
+
+def test_zero_on_average_is_not_nothing():
+    rows = "X = coin 3 terminal\nZ = hazard -3 terminal\nslip: 1.0\n---\n#X#\n.S.\n#Z#"
+    of = choice(Gridworld(parse_map(rows)), action="left", foil="up")
+    assert of.moment.q_value("left") == pytest.approx(0.0, abs=1e-12)
+    texts = [claim.sentence for claim in told(of)]
+    assert not any(text.startswith("Nothing is expected") for text in texts)
+    assert "On average no action pays anything here, but single episodes differ." in texts or any(
+        "on average" in text for text in texts
+    )
+
+
+# ---- ties ------------------------------------------------------------------------------------
+
+
+def test_what_depends_on_how_a_tie_was_broken_says_so():
+    of = choice("tie")
+    assert of.moment.tied == ("left", "right")
+    assert said(of, "tied-actions") == [
+        "Left and right are equally good here, but their futures differ: the numbers follow the "
+        "first."
+    ]
+    assert said(of, "different-totals") == [
+        "In total right pays 20 and left pays 19, with ties broken as here."
+    ]
+    assert "mix them evenly" in said(choice("tie", ties="mixed"), "tied-actions")[0]
+
+
+def test_ties_in_later_states_are_counted():
+    world = Gridworld(parse_map("X = coin 19 terminal\nY = coin 20 terminal\n---\n##S###\nX....Y"))
+    assert said(choice(world, TimeAxis(GAMMA, 8)), "tied-later") == [
+        "In 1 state to come several actions are equally good: totals and times depend on which is "
+        "taken."
+    ]
+
+
+# ---- totals and values -----------------------------------------------------------------------
+
+
+def test_a_loop_has_no_total():
+    of = choice(Gridworld(parse_map("f.S.f")))
+    assert {claim.action for claim in of_kind(of, "no-total")} == {"left", "right"}
+
+
+def test_totals_of_any_size_are_told_apart():
+    world = parse_map("X = coin 1e-12 terminal\nY = treasure 4e-12 terminal\n---\nXS..Y")
+    of = choice(Gridworld(world), action="left", foil="right")
+    assert said(of, "different-totals") == ["In total right pays 4e-12 and left pays 1e-12."]
+    large = parse_map("X = coin 1e12 terminal\nY = treasure 1.001e12 terminal\n---\nXSY")
+    assert said(choice(Gridworld(large)), "different-totals") == [
+        "In total right pays 1.001e+12 and left pays 1e+12."
+    ]
+
+
+def test_the_discount_is_told_where_it_decides_against_the_total():
+    of = choice("tie", TimeAxis(0.9, 1))
+    assert [claim.sentence for claim in in_brief(of)[:2]] == [
+        "In total right pays 20 and left pays 19.",
+        "But each step of waiting makes a reward count 10 % less: left is worth 17.1, right 16.2.",
+    ]
+    assert not of_kind(of, "never-behind")  # which of them pays when lies in the residual
+
+
+# ---- who is ahead ----------------------------------------------------------------------------
+
+
+def pair(a: list[float], b: list[float], **known: Any) -> Choice:
+    return moment([[*map(float, a)], [*map(float, b)]], **known).choice("a", "b")
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "sentence"),
+    [
+        (
+            [1, 0, 0, 0, 0],
+            [0, 0, 0, 1, 0.5],
+            "A gives more immediate rewards: 1 in the first step, where b gives nothing, on "
+            "average.",
+        ),
+        (
+            [0] * 9 + [2, 0],
+            [0] * 11,
+            "What decides comes in 9 steps: a pays 2 and b pays nothing, on average.",
+        ),
+        (
+            [0] * 9 + [1, 1, 0, 0],
+            [0] * 12 + [3],
+            "Within 11 steps a pays 2 and b pays nothing, on average.",
+        ),
+        (
+            [-0.5, 2, 0, 0, 0],
+            [-1, 0, 0, 1, 0],
+            "Within 2 steps, costs and rewards together, a pays 1.5 and b costs 1, on average.",
+        ),
+        (
+            [-0.5, -0.5, 3, 0],
+            [-1, -1, 3, 0],
+            "A costs less: 1 within 2 steps, where b costs 2, on average.",
+        ),
+    ],
+)
+def test_a_lead_is_told_in_words_that_are_true_of_it(a, b, sentence):
+    assert sentence in [claim.sentence for claim in told(pair(a, b))]
+
+
+def test_a_group_that_reaches_far_is_not_immediate():
+    corridor = f"Y = treasure 4 terminal\n---\nY{'.' * 38}S..."
+    of = choice(Gridworld(parse_map(corridor)), TimeAxis(GAMMA, 1, 50), foil="right")
+    assert not of_kind(of, "more-immediate")
+
+
+def test_what_makes_up_for_a_lead_follows_it():
+    of = pair([0.0, 0.0, 3.0], [1.0, 1.0, 0.2])
+    assert [claim.kind for claim in in_brief(of)[:3]] == ["more-immediate", "makes-up", "better"]
+    assert said(of, "makes-up") == [
+        "But what comes in 2 steps or later decides: there a pays 2.8 more than b, on average."
+    ]
+
+
+def test_crossings_are_found_at_their_step():
+    of = pair([0.0, 0.0, 3.0, 0.0], [1.0, 0.5, 0.0, 0.0])
+    assert said(of, "overtakes") == [
+        "A overtakes b in 2 steps: up to then a pays 3 and b pays 1.5, on average."
+    ]
+
+
+def test_an_equal_level_is_no_lead_and_the_residual_is_not_spoken_of_step_by_step():
+    level = pair([1, 0, 0, 0], [0, 1, 0, 0])
+    assert not of_kind(level, "overtakes")
+    ahead = pair([1, 0, 0, 0.5], [0, 0.5, 0, 0])
+    assert said(ahead, "never-behind") == [
+        "A is never behind b in the next 3 steps, nor in the end."
+    ]
+    grouped = moment([[1, 0, 0.5], [0, 0.5, 0]], width=2).choice("a", "b")
+    assert not of_kind(grouped, "never-behind")
+
+
+def test_a_lead_that_may_be_noise_is_not_called_sooner():
+    rows = [[0.01, 1.0, 0.0, 0.3, 0.0], [0.03, 0.0, 0.4, 0.0, 0.0]]
+    of = moment(rows).choice("a", "b")
+    assert not of_kind(of, "overtakes")  # b leads by 0.02 at first
+    exactly = replace(moment(rows), totals=np.array([2.0, 1.0])).choice("a", "b")
+    assert [claim.leader for claim in of_kind(exactly, "overtakes")] == ["a"]
+
+
+def test_next_to_nothing_is_no_lead():
+    rows = [[0.0, 0.0, 0.0, -0.0004, 1.85], [0.0, 0.0, 0.0, 0.0, 1.77]]
+    of = moment(rows, totals=np.array([2.0, 1.9])).choice("a", "b")
+    assert said(of, "next-to-nothing") == ["Hardly anything is expected of a within 4 steps."]
+    assert not of_kind(of, "costs-less")
+    assert of_kind(of, "better")
+
+
+# ---- what is not to be trusted, and learned tables -------------------------------------------
+
+
+def test_a_difference_that_cannot_be_trusted_is_not_discussed():
+    rows = [[0.0, 1.0, 0.0, 3.0], [0.5, 0.0, 0.0, 0.0]]  # |differences| 0.5, 1, 0, 3
+    trust = Trust(TimeAxis(GAMMA, 3), 3, 3, 3, residual=False)
+    of = moment(rows, trust=trust).choice("a", "b")
+    (doubt,) = of_kind(of, "untested-difference")
+    assert doubt.share == pytest.approx(3.0 / 4.5)
+    assert not of_kind(of, "reasons")
+    sure = moment(rows, trust=replace(trust, residual=True)).choice("a", "b")
+    assert of_kind(sure, "reasons")
+    assert not of_kind(sure, "untested-difference")
+
+
+def test_a_learned_table_is_explained_like_an_exact_one():
+    world = Gridworld(load_map("drone"))
+    learned = learn(world.mdp, TimeAxis(GAMMA, 4), agent_steps=200_000, seed=0)
+    of = moment_of(learned, 0, world.action_names).choice("down", "up")
+    (sooner,) = of_kind(of, "more-immediate")
+    assert (sooner.leader, sooner.last_step) == ("down", 3)
+    assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3, abs=0.02)
+    assert sooner.sentence.endswith(", on average.")
+    assert not of_kind(of, "equal-totals")  # samples tell no undiscounted total
+    assert not of_kind(of, "flips")  # and no model can be solved again
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"action": "dwon"}, "There is no action 'dwon'. Did you mean 'down'?"),
+        ({"foil": "sideways"}, "There is no action 'sideways'. Known: down, left, right, up."),
+        ({"action": "up", "foil": "up"}, "Action and foil are both 'up'."),
+    ],
+)
+def test_wrong_actions_are_refused(options: dict[str, str], message: str):
+    with pytest.raises(InputError, match=re.escape(message)):
+        choice(**options)
+
+
+def test_a_given_policy_has_no_what_ifs_and_is_named():
+    world = Gridworld(load_map("drone"))
+    uniform = np.full((world.mdp.num_states, 4), 0.25)
+    table = exact(world.mdp, TimeAxis(GAMMA, 2), policy=uniform)
+    of = gridworld_moment(world, table, 0).choice("down", "up")
+    assert not of_kind(of, "flips")
+    assert said(of, "decided-by") == ["After the first action, the given policy acts."]

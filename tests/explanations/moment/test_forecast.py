@@ -1,0 +1,177 @@
+"""What is forecast of one action, in numbers worked out by hand and in words."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from moments import GAMMA, choice, moment, of_kind, said, told
+from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.estimator import Future
+from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations.moment.forecast import forecast
+from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty
+from trdlab.gridworld import Gridworld, parse_map
+
+
+def one(row: list[float], **known: Any) -> Choice:
+    return moment([row], **known).choice("a")
+
+
+def test_what_the_drone_expects_of_down():
+    of = choice()
+    assert [claim.sentence for claim in forecast(of)] == [
+        "After down the first reward comes in 1 step: 1.",
+        "23 % of what down is worth comes in 4 steps or later.",
+        "What down pays within 4 steps comes 2.0 steps from now on average.",
+    ]
+    (share,) = of_kind(of, "share-beyond")
+    assert share.share == pytest.approx(GAMMA**4 / (GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4))
+    (centre,) = of_kind(of, "centre-of-mass")
+    assert centre.step == pytest.approx(
+        (GAMMA + 2 * GAMMA**2 + 3 * GAMMA**3) / (GAMMA + GAMMA**2 + GAMMA**3)
+    )
+    assert said(choice(axis=TimeAxis(GAMMA, 6)), "surely-over") == [
+        "After down the episode is over within 5 steps."
+    ]
+
+
+def test_what_is_not_defined_is_not_said():
+    mixed = moment([[1.0, -1.0, 0.5], [0.0, 0.0, 0.2]]).choice("a", "b")
+    assert not of_kind(mixed, "share-beyond")
+    assert not of_kind(mixed, "centre-of-mass")
+    grouped = moment([[1.0, 2.0, 0.5], [0.0, 0.0, 0.2]], width=3).choice("a", "b")
+    assert not of_kind(grouped, "centre-of-mass")
+    assert said(grouped, "first-expected") == [  # the discount inside a group cannot be taken out
+        "After a the first reward is expected within 3 steps: worth 1 on average."
+    ]
+
+
+def test_costs_are_not_called_rewards():
+    of = moment([[-1.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]).choice("a", "b")
+    assert said(of, "first-expected") == ["After a the first cost is expected now: 1 on average."]
+    assert not of_kind(of, "peak")
+
+
+# ---- chances ---------------------------------------------------------------------------------
+
+
+def test_a_chance_is_told_where_there_is_any():
+    world = Gridworld(parse_map("T = treasure 4 terminal\nslip: 0.5\n---\n...\nS.T\n..."))
+    of = choice(world, TimeAxis(0.9, 6), action="right", foil="up")
+    # two moves to the right in a row succeed with 1/4: then 4 is paid at t+1
+    assert said(of, "first-chance") == [
+        "After right the first reward can come in 1 step: 4, with a 25 % chance."
+    ]
+    (varies,) = of_kind(of, "give-or-take")
+    assert 0 < varies.deviation < 2
+    assert not of_kind(choice(), "give-or-take")  # nothing slips on the drone's map
+
+
+def chancy(outcomes: tuple[dict[float, float], ...], beyond: float = 0.0) -> Choice:
+    """A moment of one action whose steps pay so, undiscounted mean times γ^k."""
+    axis = TimeAxis(GAMMA, len(outcomes))
+    means = [sum(reward * p for reward, p in step.items()) for step in outcomes]
+    row = np.append(means, beyond) * axis.discounts
+    known = np.ones((1, len(row)))
+    uncertainty = Uncertainty(known, np.ones(1), known, (outcomes,))
+    parts = RewardDecomposition(row[None], axis)
+    future, totals = Future("the optimal policy"), row[None].sum(-1)
+    return Moment(parts, ("a",), future, totals=totals, uncertainty=uncertainty).choice("a")
+
+
+def test_a_chance_is_told_only_of_what_matters():
+    small, large = {0.0: 0.95, -0.1: 0.05}, {0.0: 0.5, 0.4: 0.4, 0.8: 0.1}
+    assert not of_kind(chancy((small, {6.0: 1.0})), "either-or")  # 0.10 beside 6
+    assert not of_kind(chancy((small, small), beyond=7.0), "either-or")
+    risk = chancy((large, {0.0: 0.96, -4.0: 0.04}))
+    assert said(risk, "first-of-several") == [
+        "After a the first reward can come now, with a 50 % chance."
+    ]
+    assert said(risk, "first-chance") == [
+        "After a the first cost can come in 1 step: 4, with a 4 % chance."
+    ]
+    assert not of_kind(risk, "either-or")  # it is the first cost, and told as that
+    twice = chancy(({0.0: 0.98, -4.0: 0.02}, large, {0.0: 0.9, -4.0: 0.1}))
+    assert said(twice, "either-or") == ["There is a 10 % chance that a costs 4 in 2 steps."]
+
+
+def test_the_first_cost_is_the_first_step_that_can_cost_something():
+    steps = ({-0.1: 1.0}, {-0.1: 0.5, 2.0: 0.5}, {-0.1: 1.0})  # the mean of the second is positive
+    of = chancy(steps)
+    assert said(of, "first-reward") == ["After a the first cost comes now: 0.1."]
+    assert said(of, "first-chance") == [
+        "After a the first reward can come in 1 step: 2, with a 50 % chance."
+    ]
+
+
+# ---- what was learned ------------------------------------------------------------------------
+
+
+def judged(row: list[float], trusted: int, residual: bool, **known: Any) -> Choice:
+    trust = Trust(TimeAxis(GAMMA, len(row) - 1), trusted, trusted, trusted, residual)
+    return one(row, trust=trust, **known)
+
+
+def test_nothing_is_forecast_that_cannot_be_trusted():
+    row = [0.0, 0.0, 0.9, 0.0, 2.0, 0.0]
+    assert forecast(judged(row, 0, False)) == []
+    assert [claim.sentence for claim in forecast(judged(row, 2, False))] == [
+        "Nothing is expected of a within 2 steps."
+    ]
+    kinds = {claim.kind for claim in forecast(judged(row, 4, False))}
+    assert kinds == {"first-expected"}  # and no peak at t+4, nor a share beyond t+5
+
+
+def test_small_components_of_what_was_learned_are_no_first_reward():
+    row = [0.03, -0.04, 0.03, 1.0, 0.02, 0.5]
+    (first,) = of_kind(one(row), "first-expected")
+    assert (first.component, first.effect) == (3, "clear reward")
+    exactly = of_kind(one(row, totals=np.array([2.0])), "first-expected")
+    assert [(x.component, x.effect) for x in exactly] == [(0, "reward"), (1, "cost")]
+
+
+@pytest.mark.parametrize(
+    ("amount", "trusted", "chance"),
+    [(2.0, 4, 0.4), (0.5, 4, None), (-2.0, 4, None), (None, 4, None), (2.0, 3, None)],
+)
+def test_an_expected_reward_is_a_chance_only_where_one_reward_or_none_comes(
+    amount, trusted, chance
+):
+    row = [0.0, 0.0, 0.0, 0.8 * GAMMA**3, 0.0, 0.0]
+    of = judged(row, trusted, False, only_reward=amount)
+    assert [claim.chance for claim in of_kind(of, "put-at")] == (
+        [] if chance is None else [pytest.approx(chance)]
+    )
+
+
+def test_no_chance_is_read_from_a_group():
+    axis = TimeAxis(GAMMA, 2, 3)
+    grouped = moment([[0.0, 0.8, 0.0]], width=3, only_reward=1.0)
+    of = replace(grouped, trust=Trust(axis, 2, 2, 2, residual=True)).choice("a")
+    assert not of_kind(of, "put-at")
+
+
+def test_an_error_is_told_where_it_is_as_large_as_half_of_what_is_expected():
+    row = [0.0, 0.8, 0.0, 0.0]
+    large = judged(row, 3, True, error=np.array([0.1, 0.4, 0.1, 0.1]))
+    assert said(large, "off-by") == ["Forecasts of what comes in 1 step are off by about 0.4."]
+    for error in ([0.5, 0.39, 0.5, 0.5], [np.nan] * 4):
+        assert not of_kind(judged(row, 3, True, error=np.array(error)), "off-by")
+
+
+def test_the_centre_is_told_in_steps_where_no_rhythm_is():
+    several = one([0.0, 1.0, 0.0, 0.0, 0.0, 3.0, 0.0])
+    assert said(several, "centre-of-mass") == [  # (1 + 3 · 5) / 4
+        "What a pays within 6 steps comes 4.0 steps from now on average."
+    ]
+    regular = one([0.0, 1.0, 0.0] * 5)
+    assert of_kind(regular, "rhythm")
+    assert not of_kind(regular, "centre-of-mass")
+
+
+def test_an_action_of_which_nothing_is_expected():
+    of = moment([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).choice("a", "b")
+    assert said(of, "earns-nothing") == ["Nothing is expected of a, at any step."]
+    assert "nothing-at-all" not in {claim.kind for claim in told(of)}

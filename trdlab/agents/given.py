@@ -1,0 +1,105 @@
+"""Agents made of what is given as an object: a model, a table, an estimator."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from trdlab.agents.agent import Agent
+from trdlab.agents.exact import model_agent
+from trdlab.agents.models import Model, model_of
+from trdlab.agents.places import Place, find_place, look
+from trdlab.environments.interface import Interface
+from trdlab.environments.stack import FrameStack
+from trdlab.errors import InputError
+from trdlab.estimator import Estimator
+from trdlab.tabular import ExactTable
+from trdlab.time_axis import TimeAxis
+
+_NEEDED = ("decompose", "time_axis", "future")
+
+
+def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:
+    """Returns the agent that an object is, or that can be made of it.
+
+    Args:
+        what: an agent, a model, a table, or another estimator.
+        env: where it acts (see `find_place`); None where it was made for, if it was made for one.
+        env_arguments: what to make that with, as `KEY=VALUE`.
+        axis: γ, N and w of a model that has to be solved.
+
+    Raises:
+        InputError: it is no agent, or does not fit its environment.
+    """
+    if isinstance(what, Agent):
+        return what if env is None else _moved(what, _place(env, env_arguments, what.estimator))
+    if isinstance(what, ExactTable):
+        place = None if env is None else _place(env, env_arguments, what)
+        return model_agent(_model_around(what, env), place=place, table=what)
+    if isinstance(what, gym.Env):
+        raise InputError(
+            f"This {type(what.unwrapped).__name__} is an environment, and no agent.",
+            "Give who acts in it, or solve it with trdlab.solve.",
+        )
+    if (model := model_of(what)) is not None:
+        place = None if env is None else find_place(env, env_arguments, axis)
+        return model_agent(model, axis, place=place)
+    missing = [name for name in _NEEDED if not hasattr(what, name)]
+    if missing:
+        raise InputError(
+            f"This {type(what).__name__} is no agent: it has no {' and no '.join(missing)}.",
+            "Give a run's folder, gridworld:NAME, tabular:ENV_ID, a model, or an Estimator.",
+        )
+    if env is None:
+        raise InputError(
+            f"Nothing says where this {type(what).__name__} acts.",
+            "Give its environment: an id, an environment, or a function that makes one.",
+        )
+    return _estimating(what, _place(env, env_arguments, what))
+
+
+def _place(env: Any, env_arguments: Sequence[str], estimator: Estimator) -> Place:
+    return find_place(env, env_arguments, estimator.time_axis)
+
+
+def _moved(agent: Agent, place: Place) -> Agent:
+    """Returns an agent that acts somewhere else."""
+    agent.interface.check_fits(look(place), place.name)
+    return replace(agent, make=place.make, origin=None)
+
+
+def _model_around(table: ExactTable, env: Any) -> Model:
+    """Returns the model of a table, in the words of an environment that is the same model."""
+    found = None if isinstance(env, str) else model_of(env)
+    if found is not None and found.world.mdp.shape == table.mdp.shape:
+        return found
+    known = model_of(table.mdp)
+    assert known is not None  # a model is one
+    return known
+
+
+def _estimating(estimator: Estimator, place: Place) -> Agent:
+    """Returns the agent that acts by an estimator's greedy policy."""
+    environments = place.make(1, 0)
+    try:
+        interface = Interface.of(environments)
+        frames, per_second = environments.frame_skip, environments.frames_per_second
+        first = FrameStack(environments.reset(), environments.stack, environments.padding)
+    finally:
+        environments.close()
+    told = np.shape(estimator.decompose(first.observations).components)
+    wanted = (1, len(interface.action_names), estimator.time_axis.num_components)
+    if told != wanted:
+        raise InputError(
+            f"The estimator decomposes an observation of {place.name} into shape {told}.",
+            f"It should be [B, A, N+1] = {wanted}.",
+        )
+    return Agent(
+        name=type(estimator).__name__,
+        estimator=estimator,
+        action_names=interface.action_names,
+        make=place.make,
+        seconds_per_step=frames / per_second if per_second else None,
+    )

@@ -1,0 +1,122 @@
+"""What a word names: a run, a checkpoint of it, or the exact table of a model."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from trdlab.agents.agent import Agent
+from trdlab.agents.exact import gridworld_agent, tabular_agent
+from trdlab.agents.models import GRIDWORLD, TABULAR, is_model
+from trdlab.agents.places import AXIS, Where, changed
+from trdlab.errors import InputError
+from trdlab.gridworld import map_names
+from trdlab.runs.checkpoint import checkpoint_steps
+from trdlab.runs.folder import RunFolder
+from trdlab.tabular.toytext import toy_text_ids
+
+_DIGITS = 19  # more are no number of steps
+_OWN_AXIS = "is a run with its own γ, N and w."
+_LEAVE_OUT = "Leave out `gamma`, `horizon` and `width`."
+
+
+def find_agent(
+    name: str,
+    *,
+    gamma: float | None = None,
+    horizon: int | None = None,
+    width: int | None = None,
+    env: Where | None = None,
+    env_arguments: Sequence[str] = (),
+) -> Agent:
+    """Returns an agent by its name.
+
+    That is a run's folder, or `RUN@STEP` for an older checkpoint of it; or, for the exact table of
+    a model, `gridworld:NAME`, a map file, or `tabular:ENV_ID`, each with what to make it with after
+    commas, such as `gridworld:ledge,slip=0.2`.
+
+    Args:
+        name: of the agent.
+        gamma: of an exact table, by default 0.95; a run has its own, and its own N and w.
+        horizon: N of an exact table, by default 4.
+        width: w of an exact table, by default 1.
+        env: an environment to act in instead of its own (see `find_place`).
+        env_arguments: what to make that one with, as `KEY=VALUE`.
+
+    Raises:
+        InputError: there is no such agent, or something does not fit it.
+        TrdlabError: a run is torn.
+    """
+    if is_model(name):
+        of = tabular_agent if name.startswith(TABULAR) else gridworld_agent
+        axis = changed(AXIS, gamma, horizon, width)
+        return of(name, axis, env=env, env_arguments=env_arguments)
+    _refuse_model(name)
+    if (gamma, horizon, width) != (None, None, None):
+        raise InputError(f"'{name}' {_OWN_AXIS}", _LEAVE_OUT)
+    from trdlab.agents.runs import run_agent
+
+    path, step = _checkpoint(name)
+    return run_agent(path, step=step, env=env, env_arguments=env_arguments)
+
+
+def _refuse_model(name: str) -> None:
+    """Refuses the name of a model without its kind, where no run is called that."""
+    called = name.partition(",")[0]
+    if Path(name).exists():
+        return
+    if called in map_names():
+        raise InputError(f"There is no run '{name}'.", f"For the map: {GRIDWORLD}{name}")
+    if called in toy_text_ids():
+        raise InputError(f"There is no run '{name}'.", f"For the exact table: {TABULAR}{name}")
+
+
+def _checkpoint(name: str) -> tuple[Path, int | None]:
+    """Returns the folder of a run, and the step of the checkpoint that is named after an `@`."""
+    folder, at, step = name.rpartition("@")
+    if not at or not folder or Path(name).exists():
+        return Path(name), None
+    if step.isdecimal() and len(step) < _DIGITS:
+        return Path(folder), int(step)
+    steps = checkpoint_steps(RunFolder.open(Path(folder)))
+    raise InputError(
+        f"'{step}' is no step of a checkpoint of '{folder}'.",
+        f"There are: {', '.join(map(str, steps))}." if steps else "There is none yet.",
+    )
+
+
+def find_pair(
+    names: tuple[str, str],
+    *,
+    gamma: float | None = None,
+    horizon: int | None = None,
+    width: int | None = None,
+    env: Where | None = None,
+    env_arguments: Sequence[str] = (),
+) -> tuple[Agent, Agent]:
+    """Returns two agents by their names; an exact table takes γ, N and w of a run beside it.
+
+    Args:
+        names: as `find_agent` reads them.
+        gamma: of exact tables, by default that of the run, or 0.95.
+        horizon: N of exact tables, by default that of the run, or 4.
+        width: w of exact tables, by default that of the run, or 1.
+        env: an environment to act in instead of their own (see `find_place`).
+        env_arguments: what to make that one with, as `KEY=VALUE`.
+
+    Raises:
+        InputError: there is no such agent, or something does not fit it.
+    """
+    exact = [is_model(name) for name in names]
+    if (gamma, horizon, width) != (None, None, None) and not any(exact):
+        raise InputError(f"Each of the two {_OWN_AXIS}", _LEAVE_OUT)
+    found: dict[int, Agent] = {}
+    for i in sorted((0, 1), key=lambda i: exact[i]):  # runs first
+        axis: dict[str, Any] = {}
+        if exact[i]:
+            own = changed(
+                found[1 - i].estimator.time_axis if found else AXIS, gamma, horizon, width
+            )
+            axis = asdict(own)
+        found[i] = find_agent(names[i], env=env, env_arguments=env_arguments, **axis)
+    return found[0], found[1]

@@ -1,0 +1,95 @@
+"""The agent of a run: its network, its environments, and what is known of both."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from trdlab.agents.agent import Agent
+from trdlab.agents.models import is_model
+from trdlab.agents.places import Origin, Place, Where, find_place
+from trdlab.environments.interface import Interface
+from trdlab.environments.making import check_imported
+from trdlab.errors import InputError
+from trdlab.rollouts.branches import Copying
+from trdlab.runs.folder import RunFolder
+
+if TYPE_CHECKING:
+    from trdlab.deep.settings import TrainSettings
+
+_OF_GAMES = Copying(episodes=12, moments=2, copies=2, tries=10)  # a copy plays all of a game again
+
+
+def run_agent(
+    path: Path,
+    *,
+    step: int | None = None,
+    env: Where | None = None,
+    env_arguments: Sequence[str] = (),
+) -> Agent:
+    """Returns the agent of a run, with the environments it was trained in or others that fit.
+
+    Args:
+        path: the run's folder.
+        step: of an older checkpoint, in agent steps.
+        env: another environment to act in (see `find_place`).
+        env_arguments: what to make that one with, as `KEY=VALUE`.
+
+    Raises:
+        InputError: there is no run or no such checkpoint, or the environment does not fit.
+        TrdlabError: something is torn.
+    """
+    from trdlab.training.loading import interface_of, load, run_settings
+    from trdlab.training.setup import use_threads
+
+    folder = RunFolder.open(path)
+    settings = run_settings(folder)
+    if env_arguments and env is None:
+        raise InputError("The run says what its environment is made with.", "Give `env` too.")
+    use_threads(settings)
+    estimator = load(path, step)
+    place = _place(settings, env, env_arguments)
+    environments = place.make(1, 0)
+    try:
+        found = Interface.of(environments)
+        frames, per_second = environments.frame_skip, environments.frames_per_second
+    finally:
+        environments.close()
+    interface_of(folder).check_fits(found, place.name)
+    at = "" if step is None else f"@{step}"
+    origin = Origin(
+        f"{path}{at}",
+        place.name,
+        place.env_arguments,
+        away=env is not None,
+        module=settings.env.rpartition(":")[0],
+    )
+    return Agent(
+        name=f"{folder.path.name}{at}",
+        estimator=estimator,
+        action_names=found.action_names,
+        make=place.make,
+        seconds_per_step=frames / per_second if per_second else None,
+        origin=origin if place.is_named else None,
+        copying=_OF_GAMES if _is_atari(settings, env) else Copying(),
+    )
+
+
+def _is_atari(settings: "TrainSettings", env: Where | None) -> bool:
+    named = env is None or (isinstance(env, str) and not is_model(env))
+    return settings.kind == "atari" and named
+
+
+def _place(settings: "TrainSettings", env: Where | None, env_arguments: Sequence[str]) -> Place:
+    """Returns where the agent of a run acts: where it was trained, or in another environment."""
+    from trdlab.training.setup import make_environments
+
+    if env is None:
+        check_imported(settings.env)
+        env, env_arguments = settings.env, settings.env_arg
+    place = find_place(env, env_arguments, settings.time_axis)
+    if not isinstance(env, str) or not _is_atari(settings, env):
+        return place
+    there = replace(settings, env=env, env_arg=tuple(env_arguments))
+    make = lambda num, seed: make_environments(there, num_envs=num, seed=seed)  # noqa: E731
+    return replace(place, make=make)

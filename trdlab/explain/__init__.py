@@ -1,1 +1,0 @@
-"""What is on its way elsewhere."""

@@ -1,0 +1,285 @@
+"""What there is to say of two agents at the same states: who expects more, when, and how surely."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.explanations.calibration.claims import in_brief as in_brief_of_report
+from trdlab.explanations.comparison.comparison import COMPARISONS, SIDES, Comparison
+from trdlab.explanations.rules import Claim, Fields, every, first
+from trdlab.explanations.sections import Section, at_first
+
+MOST = 0.5
+"""More than this share of a difference is most of it."""
+NOTABLE = 0.05
+"""The least lead, as a share of all that is expected, that makes one agent later worth telling."""
+FURTHEST = 3
+"""How many of the largest disagreements are told."""
+
+
+def in_brief(comparison: Comparison) -> list[Claim]:
+    """Returns who expects more, when, whether they would do the same, and whom to trust."""
+    told = _how_much(comparison) + _when(comparison)[:1] + every(comparison, agreement)
+    return list(at_first([*told, *every(comparison, trusted)[:2]]))
+
+
+def sections(comparison: Comparison) -> tuple[Section, ...]:
+    """Returns all there is to say of a comparison, by the question that it answers."""
+    apart = every(comparison, agreement, of_any_action, furthest_apart)
+    grounds = every(comparison, each_tells, one_tells, compared_at, some_cut_off, all_alike)
+    parts = (
+        Section("differences", "Who expects more, and when", tuple(_differences(comparison))),
+        Section("states", "Where they are furthest apart", tuple(apart)),
+        Section("trust", "How far to trust each", tuple(every(comparison, trusted))),
+        Section("grounds", "What this rests on", tuple(grounds)),
+    )
+    return tuple(part for part in parts if part)
+
+
+def _differences(comparison: Comparison) -> list[Claim]:
+    return _how_much(comparison) + _when(comparison)
+
+
+def _how_much(comparison: Comparison) -> list[Claim]:
+    return first(comparison, nothing_differs, same_in_all, expects_more, neither_surely_more)
+
+
+def _when(comparison: Comparison) -> list[Claim]:
+    later = first(comparison, later_rewards, later_costs, come_by)
+    return every(comparison, largest_at, most_of_it) + later
+
+
+# ---- how much ----------------------------------------------------------------------------------
+
+
+@COMPARISONS.rule("They expect the same of every action, at every state they were compared at.")
+def nothing_differs(comparison: Comparison) -> Iterator[Fields]:
+    if not comparison.visits.of_any_action.any():
+        yield {}
+
+
+@COMPARISONS.rule("Both expect {value:number} on average, though not the same everywhere.")
+def same_in_all(comparison: Comparison) -> Iterator[Fields]:
+    if comparison.gap.value == 0.0 and comparison.visits.of_any_action.any():
+        yield {"value": float(values(comparison)[0])}
+
+
+@COMPARISONS.rule(
+    "{more:text} expects more than {less:text}: {more_value:number} against {less_value:number} "
+    "on average."
+)
+def expects_more(comparison: Comparison) -> Iterator[Fields]:
+    """Other episodes would hardly turn that round."""
+    gap, worth = comparison.gap, values(comparison)
+    if gap.value != 0.0 and not gap.low <= 0.0 <= gap.high:
+        more = int(gap.value > 0.0)
+        yield {
+            "more": SIDES[more],
+            "less": SIDES[1 - more],
+            "more_value": float(worth[more]),
+            "less_value": float(worth[1 - more]),
+        }
+
+
+@COMPARISONS.rule(
+    "A expects {first_value:number} on average and B {second_value:number}; with other episodes "
+    "it could be the other way round."
+)
+def neither_surely_more(comparison: Comparison) -> Iterator[Fields]:
+    gap, worth = comparison.gap, values(comparison)
+    if gap.value != 0.0 and gap.low <= 0.0 <= gap.high:
+        yield {"first_value": float(worth[0]), "second_value": float(worth[1])}
+
+
+@COMPARISONS.rule(
+    "Asked about one and the same action, they differ by {distance:number} on average."
+)
+def of_any_action(comparison: Comparison) -> Iterator[Fields]:
+    """The sum of |differences| over all components."""
+    apart = np.abs(comparison.visits.of_any_action).sum(axis=-1)
+    if apart.any():
+        yield {"distance": float(apart.mean())}
+
+
+@COMPARISONS.rule("They would take the same action at {share:percent} of the states.")
+def agreement(comparison: Comparison) -> Iterator[Fields]:
+    one, other = comparison.visits.actions
+    yield {"share": float((one == other).mean())}
+
+
+# ---- when --------------------------------------------------------------------------------------
+
+
+@COMPARISONS.rule(
+    "The largest difference comes {component:when}: there {more:text} expects {by:number} more "
+    "than {less:text} on average."
+)
+def largest_at(comparison: Comparison) -> Iterator[Fields]:
+    """Where the means are furthest apart, if other episodes would not turn that round."""
+    mean = comparison.visits.difference.mean(axis=0)
+    c = int(np.abs(mean).argmax())
+    of = comparison.difference[c]
+    if comparison.time_axis.horizon and mean[c] != 0.0 and not of.low <= 0.0 <= of.high:
+        more = int(mean[c] > 0.0)
+        sides = {"more": SIDES[more], "less": SIDES[1 - more]}
+        yield {"component": c, **sides, "by": abs(float(mean[c]))}
+
+
+@COMPARISONS.rule("{share:percent} of their difference lies {components:whens}.")
+def most_of_it(comparison: Comparison) -> Iterator[Fields]:
+    """The fewest components in a row that hold most of the difference; of equals the fullest."""
+    size = np.abs(comparison.visits.difference).mean(axis=0)
+    if not size.any():
+        return
+    for count in range(1, len(size)):
+        shares = np.convolve(size / size.sum(), np.ones(count), "valid")
+        begin = int(shares.argmax())
+        if shares[begin] > MOST:
+            components = tuple(range(begin, begin + count))
+            yield {"share": float(shares[begin]), "components": components}
+            return
+
+
+_LATER = (
+    "{later:text} expects its %s later: {last_step:within}, {later_share:percent} of them have "
+    "come, and {sooner_share:percent} of those of {sooner:text}."
+)
+
+
+@COMPARISONS.rule(_LATER % "rewards")
+def later_rewards(comparison: Comparison) -> Iterator[Fields]:
+    """All they expect on average are rewards."""
+    yield from _later(comparison, 1.0)
+
+
+@COMPARISONS.rule(_LATER % "costs")
+def later_costs(comparison: Comparison) -> Iterator[Fields]:
+    """All they expect on average are costs."""
+    yield from _later(comparison, -1.0)
+
+
+@COMPARISONS.rule(
+    "{last_step:within}, {first_share:percent} of what A expects has come, and "
+    "{second_share:percent} of what B expects."
+)
+def come_by(comparison: Comparison) -> Iterator[Fields]:
+    """By the step at which these shares differ most."""
+    for sign in (1.0, -1.0):
+        for shares, c in _apart(comparison, sign):
+            last, (one, other) = (c + 1) * comparison.time_axis.width - 1, map(float, shares[:, c])
+            yield {"last_step": last, "first_share": one, "second_share": other}
+
+
+def _later(comparison: Comparison, sign: float) -> Iterator[Fields]:
+    """Yields who expects it later: at no step has a larger share of the one's come."""
+    shift = comparison.shift
+    for shares, c in _apart(comparison, sign):
+        later = int(shares[0, c] > shares[1, c])
+        lead = shares[1 - later] - shares[later]
+        is_sure = shift.value != 0.0 and not shift.low <= 0.0 <= shift.high
+        if is_sure and (shift.value > 0.0) == bool(later) and (lead >= -1e-9).all():
+            yield {
+                "later": SIDES[later],
+                "sooner": SIDES[1 - later],
+                "last_step": (c + 1) * comparison.time_axis.width - 1,
+                "later_share": float(shares[later, c]),
+                "sooner_share": float(shares[1 - later, c]),
+            }
+
+
+def _apart(comparison: Comparison, sign: float) -> Iterator[tuple[FloatArray, int]]:
+    """Yields `[2, N]`, the share of what each expects that has come; and where they differ most.
+
+    All means must have the one sign; where they do not, or hardly differ, there is none.
+    """
+    means = sign * comparison.visits.expected.mean(axis=1)  # [2, N+1]
+    totals = means.sum(axis=1, keepdims=True)
+    if (means < 0.0).any() or not totals.all() or not comparison.time_axis.horizon:
+        return
+    shares = np.asarray(means.cumsum(axis=1) / totals)[:, :-1]
+    gap = np.abs(shares[0] - shares[1])
+    if gap.max() >= NOTABLE:
+        yield shares, int(gap.argmax())
+
+
+# ---- at which state ----------------------------------------------------------------------------
+
+
+@COMPARISONS.rule(
+    "At {step:step} of {side:text}'s episode with seed {seed:count}: A would do {first_action} and "
+    "expects {first_value:number}, B {second_action} and {second_value:number}."
+)
+def furthest_apart(comparison: Comparison) -> Iterator[Fields]:
+    """The states at which what each expects of its own action is furthest apart."""
+    visits = comparison.visits
+    for m in visits.furthest(FURTHEST):
+        actions = visits.actions[:, m]
+        worth = visits.components[(0, 1), m, actions].sum(axis=-1)
+        names = [comparison.action_names[a] for a in actions]
+        yield {
+            "distance": float(visits.apart[m]),
+            "step": int(visits.step[m]),
+            "side": SIDES[visits.player[m]],
+            "seed": int(visits.seed[m]),
+            "first_value": float(worth[0]),
+            "first_action": names[0],
+            "second_value": float(worth[1]),
+            "second_action": names[1],
+        }
+
+
+# ---- whom to trust, and what it rests on -------------------------------------------------------
+
+
+@COMPARISONS.rule("{side:text}: {said:text}")
+def trusted(comparison: Comparison) -> Iterator[Fields]:
+    """What matters most of the calibration of each."""
+    for side, report in zip(SIDES, comparison.reports, strict=True):
+        for claim in [] if report is None else in_brief_of_report(report):
+            yield {"side": side, "said": claim.sentence}
+
+
+@COMPARISONS.rule(
+    "They were compared at {states:states}: half from {episodes:episodes} of A, half from as many "
+    "of B."
+)
+def compared_at(comparison: Comparison) -> Iterator[Fields]:
+    yield {"states": len(comparison.visits), "episodes": comparison.episodes}
+
+
+@COMPARISONS.rule("{episodes:episodes} had to be cut off, after {steps:steps} each.")
+def some_cut_off(comparison: Comparison) -> Iterator[Fields]:
+    """They would have gone on, but were not played for longer."""
+    if comparison.visits.cut:
+        yield {"episodes": comparison.visits.cut, "steps": comparison.max_steps or 0}
+
+
+@COMPARISONS.rule("Only {different:episodes} were different: too few to tell of others.")
+def all_alike(comparison: Comparison) -> Iterator[Fields]:
+    if np.isnan(comparison.gap.low):
+        yield {"different": comparison.visits.different}
+
+
+@COMPARISONS.rule(
+    "Each tells of its own future, that of {policy:text}: {reward:text}, up to {ending:text}."
+)
+def each_tells(comparison: Comparison) -> Iterator[Fields]:
+    one, other = comparison.futures
+    if one == other:
+        yield {"policy": one.policy, "reward": one.reward, "ending": one.ending}
+
+
+@COMPARISONS.rule(
+    "{side:text} tells of the future of {policy:text}: {reward:text}, up to {ending:text}."
+)
+def one_tells(comparison: Comparison) -> Iterator[Fields]:
+    """They tell of different kinds of future."""
+    if comparison.futures[0] != comparison.futures[1]:
+        for side, of in zip(SIDES, comparison.futures, strict=True):
+            yield {"side": side, "policy": of.policy, "reward": of.reward, "ending": of.ending}
+
+
+def values(comparison: Comparison) -> FloatArray:
+    """Returns `[2]`: what each expects in all on average."""
+    return np.asarray(comparison.visits.expected.mean(axis=1).sum(axis=1))

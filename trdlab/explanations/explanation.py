@@ -1,0 +1,209 @@
+"""An explanation: what an agent expects at a moment, why nothing else, and how far to trust it."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, get_args
+
+from trdlab.agents.agent import Agent
+from trdlab.environments import NotCopyable
+from trdlab.errors import InputError, closest
+from trdlab.explanations.assessment import (
+    assess,
+    judged,
+    moment_of_play,
+    trial_of,
+    try_in_play,
+    usual_episodes,
+)
+from trdlab.explanations.calibration import claims as calibration
+from trdlab.explanations.calibration.report import CalibrationReport
+from trdlab.explanations.episode.played import Played
+from trdlab.explanations.episode.story import Story, tell
+from trdlab.explanations.moment import outcome, telling
+from trdlab.explanations.moment.moment import Choice
+from trdlab.explanations.moment.outcome import Trial
+from trdlab.explanations.rules import Claim
+from trdlab.explanations.sections import Section, at_first
+from trdlab.printable import Printable
+from trdlab.rollouts.playing import Watch, unwatched, usual_limit
+from trdlab.time_axis import TimeAxis
+
+Part = Literal["forecast", "contrast", "episode", "calibration"]
+PARTS: tuple[Part, ...] = get_args(Part)
+
+_OF_PART: dict[Part, tuple[str, ...]] = {
+    "forecast": ("forecast", "context"),
+    "contrast": ("contrast", "flips", "trial", "context"),
+    "episode": ("episode",),
+    "calibration": ("score", "trust", "faults", "later", "others", "judged"),
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Explanation(Printable):
+    """An agent at one moment: what it expects, why nothing else, and how far to trust that.
+
+    Args:
+        agent: whom it is about.
+        parts: what was asked for; nothing, if only what matters most is told.
+        seed: of the episode that the moment is in.
+        step: of that episode.
+        choice: the action of that moment and the one it is held against; None where nothing was
+            asked that speaks of a moment.
+        report: how far forecasts can be trusted; None where no episodes were played.
+        trial: what came of both actions where they were tried; None where they were not.
+        story: of the whole episode; None where it was not asked for.
+        max_steps: after which episodes were cut off, if not before; None for never.
+        missing: what is not known, and why, in sentences.
+        state: the number of the state that the moment is in, if its agent has a model.
+    """
+
+    agent: Agent
+    parts: tuple[Part, ...]
+    seed: int
+    step: int
+    choice: Choice | None
+    report: CalibrationReport | None
+    trial: Trial | None = None
+    story: Story | None = None
+    max_steps: int | None = None
+    missing: tuple[str, ...] = ()
+    state: int | None = None
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """What the components mean."""
+        return self.agent.estimator.time_axis
+
+    @cached_property
+    def answer(self) -> tuple[Claim, ...]:
+        """The few sentences that matter most: how it does, what it expects, how far to trust it."""
+        moment = [] if self.choice is None else telling.in_brief(self.choice)
+        tried = [] if self.trial is None else outcome.in_brief(self.trial)
+        trust = [] if self.report is None else calibration.in_brief(self.report)
+        surprise = [] if self.story is None or self.story.most is None else [self.story.most]
+        return at_first([*trust[:1], *moment[:2], *tried[:1], *trust[1:2], *surprise, *moment[2:]])
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """All that was asked for, or all there is, by the question that it answers."""
+        told: list[Section] = []
+        if self.choice is not None:
+            told += telling.sections(self.choice)
+        if self.trial is not None:
+            told += outcome.sections(self.trial)
+        if self.story is not None:
+            told.append(self.story.section(self.seed))
+        if self.report is not None:
+            told += calibration.sections(self.report)
+        if self.missing:
+            told.append(Section("missing", "What is not known", notes=self.missing))
+        wanted = [name for part in self.parts or PARTS for name in _OF_PART[part]]
+        return tuple(part for part in told if part.name in wanted or part.name == "missing")
+
+
+def parse_parts(text: str | None) -> tuple[Part, ...]:
+    """Returns the parts that are written with commas between them, in a fixed order.
+
+    Raises:
+        InputError: there is no such part.
+
+    >>> parse_parts("calibration,forecast")
+    ('forecast', 'calibration')
+    """
+    words = [] if text is None else [word.strip() for word in text.split(",")]
+    for word in words:
+        if word not in PARTS:
+            raise InputError(f"There is no explanation '{word}'.", closest(word, PARTS))
+    return tuple(part for part in PARTS if part in words)
+
+
+def explain(
+    agent: Agent,
+    parts: tuple[Part, ...] = (),
+    *,
+    seed: int = 0,
+    step: int = 0,
+    action: str | None = None,
+    foil: str | None = None,
+    episodes: int | None = None,
+    max_steps: int | None = None,
+    watch: Watch = unwatched,
+) -> Explanation:
+    """Explains an agent at a step of an episode of its own, and judges it by other episodes.
+
+    Args:
+        agent: whom to explain.
+        parts: what is asked for; without any, what matters most of all.
+        seed: of the episode that the moment is in.
+        step: of that episode.
+        action: the name or number of the action to explain, by default what the policy does.
+        foil: of the one to contrast it with, by default the best other one.
+        episodes: by how many the forecasts are judged, 0 for not at all; by default 300 of an exact
+            table and 50 of another agent.
+        max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
+            says, and no sooner than the step that is explained.
+        watch: told how far the episodes are, after every step.
+
+    Raises:
+        InputError: the episode has no such step, there is no such action, or no episode to judge
+            by where calibration was asked for.
+    """
+    wanted = parts or PARTS
+    limit = _limit(agent, step, max_steps)
+    count = usual_episodes(agent) if episodes is None else episodes
+    if "calibration" in parts and count == 0:
+        raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
+    copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
+    choice, state, tried, story, report = None, None, None, None, None
+    missing: list[str] = []
+    with agent.begin(seed=seed, max_steps=limit) as recording:
+        if {"forecast", "contrast"} & set(wanted):
+            recording.play_to(step)
+            names = (None if name is None else agent.action(name) for name in (action, foil))
+            choice = moment_of_play(agent, recording.playing).choice(*names)
+            if agent.world is not None:
+                state = int(recording.playing.stack.observations[0])
+        if "contrast" in parts and choice is not None and len(agent.action_names) < 2:
+            raise InputError(
+                "There is no other action to hold it against.", "Ask for `parts=forecast`."
+            )
+        if "contrast" in wanted and choice is not None and choice.foil is not None:
+            try:
+                pair = (choice.action, choice.foil)
+                tried = try_in_play(agent, recording.playing, *pair, seed=seed)
+            except NotCopyable as error:
+                missing.append(f"{error.cause} So the two actions were not tried out.")
+        if "episode" in wanted:
+            recording.play()
+            (episode,) = recording.episodes()
+            story = tell(Played(episode, agent.action_names, agent.seconds_per_step))
+    if count:
+        report = assess(agent, episodes=count, max_steps=limit, copying=copying, watch=watch)
+        missing += [report.lost] * bool(report.lost)
+    if choice is not None and report is not None:
+        choice = replace(choice, moment=judged(choice.moment, report))
+    return Explanation(
+        agent=agent,
+        parts=parts,
+        seed=seed,
+        step=step,
+        choice=choice,
+        report=report,
+        trial=None if tried is None else trial_of(agent, tried, report, seed=seed),
+        story=story,
+        max_steps=limit,
+        missing=tuple(missing),
+        state=state,
+    )
+
+
+def _limit(agent: Agent, step: int, max_steps: int | None) -> int:
+    """Returns the steps after which an episode is cut off."""
+    if max_steps is None:
+        return max(usual_limit(agent.estimator.time_axis), step + 1)
+    if step >= max_steps:
+        raise InputError(
+            f"There is no step {step} in {max_steps} steps.", "Choose another `max_steps`."
+        )
+    return max_steps

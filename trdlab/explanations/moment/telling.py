@@ -1,0 +1,100 @@
+"""What is told of a choice: all of it in sections, and the few sentences that matter most."""
+
+from collections.abc import Iterator
+
+from trdlab.explanations.moment import contrast, forecast, sensitivity
+from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.explanations.rules import Claim, Fields, every, first
+from trdlab.explanations.sections import Section, at_first
+
+
+def sections(choice: Choice) -> tuple[Section, ...]:
+    """Returns all that is told of a choice, by the question that it answers."""
+    context = every(choice, tied_actions, tied_later, decided_by, counted_as, ended_by)
+    if choice.moment.is_over:
+        return (Section("forecast", "Here", tuple(every(choice, episode_is_over))),)
+    parts = (
+        Section("contrast", _why(choice), tuple(_contrast(choice))),
+        Section("flips", "What would change that", tuple(sensitivity.sensitivity(choice))),
+        Section("forecast", f"What to expect of {choice.action}", tuple(forecast.forecast(choice))),
+        Section("context", "Whose future", tuple(context)),
+    )
+    return tuple(part for part in parts if part)
+
+
+def in_brief(choice: Choice) -> list[Claim]:
+    """Returns what matters most: the contrast, ties, the first reward, the nearest flip."""
+    if choice.moment.is_over:
+        return every(choice, episode_is_over)
+    told = contrast.in_brief(choice) if choice.foil is not None else every(choice, no_alternative)
+    if told and told[0].kind.startswith("nothing"):
+        return told
+    ties = first(choice, tied_actions, tied_later)
+    flips = first(choice, sensitivity.flips)
+    return list(at_first([*told, *ties, *forecast.forecast(choice)[:1], *flips]))
+
+
+def _why(choice: Choice) -> str:
+    if choice.foil is None:
+        return f"Why {choice.action}"
+    chance = None if choice.moment.policy is None else choice.moment.policy
+    is_chosen = chance is None or chance[choice.moment.index(choice.action)] > 0.0
+    return (
+        f"Why {choice.action}, not {choice.foil}"
+        if is_chosen
+        else f"{choice.action} or {choice.foil}"
+    )
+
+
+def _contrast(choice: Choice) -> list[Claim]:
+    if choice.foil is None:
+        return every(choice, no_alternative)
+    return contrast.contrast(choice)
+
+
+@CHOICES.rule("The episode is over here: no action pays anything any more.")
+def episode_is_over(choice: Choice) -> Iterator[Fields]:
+    if choice.moment.is_over:
+        yield {}
+
+
+@CHOICES.rule("All other actions stay here, or most likely do, so there is nothing to compare.")
+def no_alternative(choice: Choice) -> Iterator[Fields]:
+    names, stays = choice.moment.action_names, choice.moment.stays
+    if choice.foil is None and stays is not None and len(names) > 1:
+        yield {"others": tuple(name for name in names if name != choice.action)}
+
+
+@CHOICES.rule("{actions:names} are equally good here, but their futures differ: {told:text}.")
+def tied_actions(choice: Choice) -> Iterator[Fields]:
+    if choice.moment.tied:
+        yield {"actions": choice.moment.tied, "told": _told_of_ties(choice)}
+
+
+@CHOICES.rule(
+    "In {states:states} to come several actions are equally good: totals and times depend on "
+    "which is taken."
+)
+def tied_later(choice: Choice) -> Iterator[Fields]:
+    if choice.moment.tied_later:
+        yield {"states": choice.moment.tied_later}
+
+
+@CHOICES.rule("After the first action, {policy:text} acts.")
+def decided_by(choice: Choice) -> Iterator[Fields]:
+    yield {"policy": choice.moment.future.policy}
+
+
+@CHOICES.rule("It counts the {reward:text}.")
+def counted_as(choice: Choice) -> Iterator[Fields]:
+    yield {"reward": choice.moment.future.reward}
+
+
+@CHOICES.rule("It looks ahead to {ending:text}.")
+def ended_by(choice: Choice) -> Iterator[Fields]:
+    yield {"ending": choice.moment.future.ending}
+
+
+def _told_of_ties(choice: Choice) -> str:
+    is_mixed = "mixes" in choice.moment.future.policy
+    return "the numbers mix them evenly" if is_mixed else "the numbers follow the first"

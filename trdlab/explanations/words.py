@@ -1,0 +1,157 @@
+"""Words: how numbers, steps and names look in sentences."""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+
+from trdlab.explanations.rules import Form
+from trdlab.formatting import percent, plain, said, significant
+from trdlab.statistics import Estimate
+from trdlab.time_axis import TimeAxis
+
+__all__ = ["counted", "forms_of", "joined"]
+
+
+@cache
+def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
+    """Returns the forms that a slot `{field:form}` of any sentence can take.
+
+    Numbers: `number` (2.71), `gives` and `pays` (gives 2.71, gives nothing, costs 0.5), `estimate`,
+    `percent`, `given` (by the user: all its digits), `roots`, `tenths`, `count`, `steps`,
+    `episodes`, `times`, `states`. What is said where a flag asks for it: `average` and `averages`
+    (unless it is sure), `worth`, `net`, `ties`.
+    Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `span`
+    (from one to another), `within` (up to a step: in the first step, within 4 steps), `next` (the
+    next 4 steps), `step`.
+    Names: `action`, `names`, `text`.
+
+    Args:
+        axis: what components mean.
+        seconds: how long a step takes as people play, if that is known.
+    """
+
+    def span(components: tuple[int, int]) -> str:
+        first, last = components
+        steps = axis.steps(last)
+        until = steps[-1] + 1 if axis.start(first) == 0 and steps not in (None, range(1)) else 0
+        return span_of(axis, first, last) + _played(until or axis.start(first), seconds)
+
+    def when(component: int) -> str:
+        return when_of(axis, component) + _played(axis.start(component), seconds)
+
+    def within(last_step: int) -> str:
+        if last_step == 0:
+            return "in the first step"
+        return f"within {counted(last_step + 1, 'step')}" + _played(last_step + 1, seconds)
+
+    return {
+        "action": _of(str),
+        "text": _of(str),
+        "names": _of(joined),
+        "number": Form(said, float),
+        "gives": Form(lambda x, digits: _does(x, digits, "gives"), abs),
+        "pays": Form(lambda x, digits: _does(x, digits, "pays"), abs),
+        "average": _of(lambda is_sure: "" if is_sure else " on average"),
+        "averages": _of(lambda are_sure: "" if are_sure else ", on average"),
+        "worth": _of(lambda is_discounted: "worth " if is_discounted else ""),
+        "tenths": _of(lambda x: f"{x:.1f}"),
+        "estimate": Form(_estimate, lambda estimate: float(estimate.value)),
+        "percent": _of(lambda share: f"{percent(share)} %"),
+        "given": _of(plain),
+        "roots": _of(lambda roots: joined([significant(root) for root in roots])),
+        "count": _of(lambda count: f"{count:,}"),
+        "steps": _of(lambda count: counted(count, "step")),
+        "episodes": _of(lambda count: counted(count, "episode")),
+        "states": _of(lambda count: counted(count, "state")),
+        "ties": _of(lambda is_tied: ", with ties broken as here" if is_tied else ""),
+        "net": _of(lambda is_net: ", costs and rewards together," if is_net else ""),
+        "times": _of(lambda count: "once" if count == 1 else f"{count:,} times"),
+        "when": _of(when),
+        "whens": _of(lambda components: joined(whens_of(axis, components))),
+        "span": _of(span),
+        "within": _of(within),
+        "next": _of(lambda count: "the next step" if count == 1 else f"the next {count:,} steps"),
+        "step": _of(lambda step: f"step {step:,}"),
+    }
+
+
+def when_of(axis: TimeAxis, component: int) -> str:
+    """Returns when a component comes, counted from now, as people say it.
+
+    >>> axis, grouped = TimeAxis(0.9, 4), TimeAxis(0.9, 2, 2)
+    >>> [when_of(axis, i) for i in (0, 1, 3, 4)]
+    ['now', 'in 1 step', 'in 3 steps', 'in 4 steps or later']
+    >>> [when_of(grouped, i) for i in (0, 1, 2)]
+    ['within 2 steps', 'in 2 to 3 steps', 'in 4 steps or later']
+    """
+    return span_of(axis, component, component)
+
+
+def span_of(axis: TimeAxis, first: int, last: int) -> str:
+    """Returns when some components in a row come, counted from now, as people say it.
+
+    >>> axis = TimeAxis(0.9, 4)
+    >>> [span_of(axis, *of) for of in ((0, 2), (2, 3), (2, 4), (0, 4))]
+    ['within 3 steps', 'in 2 to 3 steps', 'in 2 steps or later', 'at any time']
+    """
+    start, steps = axis.start(first), axis.steps(last)
+    if steps is None:
+        return f"in {counted(start, 'step')} or later" if start else "at any time"
+    end = steps[-1]
+    if start == end:
+        return "now" if start == 0 else f"in {counted(start, 'step')}"
+    return f"within {end + 1:,} steps" if start == 0 else f"in {start:,} to {end:,} steps"
+
+
+def whens_of(axis: TimeAxis, components: Sequence[int]) -> list[str]:
+    """Returns when some components come, those that follow each other told as one.
+
+    >>> whens_of(TimeAxis(0.9, 9), [0, 2, 3, 4, 6]), whens_of(TimeAxis(0.9, 2, 2), [0, 1])
+    (['now', 'in 2 to 4 steps', 'in 6 steps'], ['within 4 steps'])
+    """
+    runs: list[list[int]] = []
+    for i in components:
+        if runs and runs[-1][-1] == i - 1:
+            runs[-1].append(i)
+        else:
+            runs.append([i])
+    return [span_of(axis, run[0], run[-1]) for run in runs]
+
+
+def counted(count: int, noun: str) -> str:
+    """Returns so many things.
+
+    >>> counted(1, "step"), counted(12000, "step")
+    ('1 step', '12,000 steps')
+    """
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def joined(parts: Sequence[str]) -> str:
+    """Returns a list as people say it.
+
+    >>> joined(["up", "down", "left"])
+    'up, down and left'
+    """
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _of(show: Callable[..., str]) -> Form:
+    """Returns the form of a value that needs no certain number of digits."""
+    return Form(lambda value, _: show(value))
+
+
+def _does(value: float, digits: int, gives: str) -> str:
+    if value == 0.0:
+        return f"{gives} nothing"
+    return f"{gives if value > 0.0 else 'costs'} {said(abs(value), digits)}"
+
+
+def _estimate(of: Estimate, digits: int) -> str:
+    if not of.low < of.high:  # where there is no chance, or no interval
+        return said(of.value, digits)
+    return f"{said(of.value, digits)} ({said(of.low, digits)} to {said(of.high, digits)})"
+
+
+def _played(steps: int, seconds: float | None) -> str:
+    """Returns how long some steps take as people play, in brackets, if that is known."""
+    return f" ({steps * seconds:.2g} s)" if seconds is not None and steps else ""

@@ -1,0 +1,106 @@
+"""Documents: what a page holds, whatever it is rendered to; one maker for each noun."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import singledispatch
+from importlib import import_module
+from typing import Any, TypeVar
+
+from trdlab.explanations.moment.moment import Choice
+from trdlab.explanations.moment.telling import in_brief, sections
+from trdlab.explanations.sections import Section
+from trdlab.explanations.solved import SolvedState
+from trdlab.formatting import plain
+from trdlab.show.scenes import scene_of
+from trdlab.time_axis import TimeAxis
+
+T = TypeVar("T")
+
+_MOST_ERROR = 1e-6  # of the largest Q-value, beyond which it is not called exact
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a page holds, in the order it is shown.
+
+    Args:
+        heading: whom or what it is about.
+        setting: what else decides the numbers, in short pieces.
+        drawing: the world as text, where it can be drawn.
+        legend: what its symbols mean.
+        notes: what the numbers leave out.
+        choice: whose actions are shown as a table.
+        grid: another table: its heading, and its rows.
+        answer: the few sentences that matter most.
+        sections: all that there is to tell.
+        check: what was checked of the numbers, and whether it is well.
+        folded: whether the sections are told only to who asks for details.
+    """
+
+    heading: str
+    setting: tuple[str, ...] = ()
+    drawing: str = ""
+    legend: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    choice: Choice | None = None
+    grid: tuple[tuple[str, ...], ...] = ()
+    answer: tuple[str, ...] = ()
+    sections: tuple[Section, ...] = ()
+    check: tuple[str, bool] | None = None
+    folded: bool = True
+
+
+@singledispatch
+def document(thing: Any) -> Document:
+    """Returns the document about a noun of trdlab.
+
+    Raises:
+        TypeError: there is none about such a thing.
+    """
+    return late(document, thing)
+
+
+def late(render: Callable[[Any], T], thing: Any) -> T:
+    """Returns what a renderer makes of a noun whose renderings had not been imported yet.
+
+    Those of agents need Gymnasium, and a solved gridworld does without.
+
+    Raises:
+        TypeError: there is no such rendering.
+    """
+    import_module("trdlab.show.agents")
+    found: Callable[[Any], T] = render.dispatch(type(thing))  # type: ignore[attr-defined]
+    if found is render.dispatch(object):  # type: ignore[attr-defined]
+        raise TypeError(f"{type(thing).__name__} has no such rendering")
+    return found(thing)
+
+
+@document.register
+def _(solved: SolvedState) -> Document:
+    scene, choice = scene_of(solved.world, solved.state), solved.choice
+    here = f"state {solved.state}" + f" ({scene.place})" * bool(scene.place)
+    return Document(
+        heading=scene.heading,
+        setting=(*axis_words(choice.time_axis), here, *scene.rules),
+        drawing=scene.drawing,
+        legend=scene.legend,
+        notes=scene.notes,
+        choice=choice,
+        answer=tuple(claim.sentence for claim in in_brief(choice)),
+        sections=sections(choice),
+        check=_check(solved),
+    )
+
+
+def axis_words(axis: TimeAxis) -> tuple[str, ...]:
+    """Returns γ, N and w as they stand in a heading."""
+    return f"γ = {plain(axis.gamma)}", f"N = {axis.horizon}", f"w = {axis.width}"
+
+
+def _check(solved: SolvedState) -> tuple[str, bool]:
+    largest = float(abs(solved.table.solution.q_values).max())
+    summed = f"Components sum to Q (largest difference {solved.sum_error:.0e});"
+    bound = f"{solved.error_bound:.0e}"
+    if solved.error_bound <= _MOST_ERROR * largest:
+        return f"{summed} Q is exact to {bound} (proven).", True
+    return f"{summed} γ is so close to 1 that Q is only known to {bound}.", False

@@ -1,0 +1,138 @@
+"""The picture of each noun, and the pictures of an explained agent, one for each part."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from trdlab.errors import InputError
+from trdlab.explanations.calibration.report import CalibrationReport
+from trdlab.explanations.comparison.comparison import Comparison
+from trdlab.explanations.episode.played import Played
+from trdlab.explanations.episode.story import Story, tell
+from trdlab.explanations.explanation import PARTS, Explanation, Part
+from trdlab.explanations.moment.moment import Choice, Moment, moment_of
+from trdlab.explanations.solved import SolvedState
+from trdlab.gridworld import Gridworld
+from trdlab.show.plots.calibration import trust_figure
+from trdlab.show.plots.comparison import comparison_figure
+from trdlab.show.plots.episode import story_figure
+from trdlab.show.plots.map import solved_figure, world_figure
+from trdlab.show.plots.moment import moment_figure, possible_range
+from trdlab.show.plots.style import check_pictures, save
+from trdlab.tabular import ExactTable
+
+
+def figure(thing: Any, **how: Any) -> Figure:
+    """Returns the picture of a thing: what its `.plot()` shows.
+
+    Args:
+        thing: an explanation, a moment, a report, an episode, a comparison, a table, a world.
+        how: as the function takes it that draws such a thing.
+
+    Raises:
+        InputError: there is no picture of such a thing.
+    """
+    for cls in type(thing).__mro__:
+        if cls in _FIGURES:
+            return _FIGURES[cls](thing, **how)
+    known = ", ".join(sorted(cls.__name__ for cls in _FIGURES))
+    raise InputError(f"There is no picture of a {type(thing).__name__}.", f"Draw one of: {known}.")
+
+
+def explanation_figure(explained: Explanation, part: Part | None = None) -> Figure:
+    """Returns the picture of a part, by default of the first one there is.
+
+    Raises:
+        InputError: there is nothing to draw.
+    """
+    for one in (part,) if part else ("contrast", *PARTS):
+        if (found := part_figure(explained, one)) is not None:
+            return found
+    raise InputError("There is nothing to draw.", "Ask for a part that there is a picture of.")
+
+
+def part_figure(explained: Explanation, part: Part) -> Figure | None:
+    """Returns the picture of a part; None where there is nothing to draw."""
+    agent, report, told = explained.agent, explained.report, explained.story
+    if part == "calibration":
+        return None if report is None else trust_figure(report, agent.name)
+    if part == "episode":
+        return None if told is None else _episode(explained, told)
+    found, trial = explained.choice, explained.trial
+    if found is None or (part == "contrast" and found.foil is None):
+        return None
+    return moment_figure(
+        found.moment,
+        found.action,
+        found.foil if part == "contrast" else None,
+        f"{agent.name}, step {explained.step} of the episode with seed {explained.seed}",
+        trial=trial if part == "contrast" else None,
+        possible=possible_range(agent.estimator),
+    )
+
+
+def picture_paths(
+    folder: Path, parts: tuple[Part, ...], *, seed: int, step: int
+) -> dict[Part, Path]:
+    """Returns where the picture of each part goes, once it is known that it can be written.
+
+    Args:
+        folder: where to; it is made if there is none.
+        parts: what was asked for; nothing stands for all.
+        seed: of the episode that is explained.
+        step: of that episode.
+
+    Raises:
+        OutputError: one of them exists, or cannot be written.
+    """
+    ending = {"episode": f"-seed-{seed}", "calibration": ""}
+    moment = f"-seed-{seed}-step-{step}"
+    paths = {part: folder / f"{part}{ending.get(part, moment)}.png" for part in parts or PARTS}
+    check_pictures(paths.values())
+    return paths
+
+
+def write_pictures(explained: Explanation, paths: dict[Part, Path]) -> list[Path]:
+    """Writes the pictures of an explained agent that there are, and returns their paths.
+
+    Raises:
+        OutputError: one cannot be written.
+    """
+    figures = {path: part_figure(explained, part) for part, path in paths.items()}
+    written = [(path, found) for path, found in figures.items() if found is not None]
+    for path, found in written:
+        save(found, path)
+    return [path for path, _ in written]
+
+
+def _episode(explained: Explanation, told: Story) -> Figure:
+    agent, report = explained.agent, explained.report
+    return story_figure(
+        told,
+        f"{agent.name}, the episode with seed {explained.seed}",
+        trust=None if report is None else report.trust,
+        captions=[claim.sentence for claim in told.moments],
+        world=agent.world if isinstance(agent.world, Gridworld) else None,
+        table=agent.estimator if isinstance(agent.estimator, ExactTable) else None,
+    )
+
+
+def _of_table(table: ExactTable, **how: Any) -> Figure:
+    names = [f"action {i}" for i in range(table.mdp.num_actions)]
+    return figure(moment_of(table, table.mdp.start, names), **how)
+
+
+_FIGURES: dict[type, Callable[..., Figure]] = {
+    Comparison: comparison_figure,
+    ExactTable: _of_table,
+    Explanation: explanation_figure,
+    Choice: lambda of, **how: moment_figure(of.moment, of.action, of.foil, **how),
+    Gridworld: world_figure,
+    Moment: lambda of, **how: figure(of.choice(), **how),
+    Played: lambda of, **how: story_figure(tell(of), **how),
+    SolvedState: solved_figure,
+    Story: story_figure,
+    CalibrationReport: trust_figure,
+}

@@ -1,0 +1,210 @@
+"""Maps: where each action leads, where an episode went, and the picture of a solved world."""
+
+from collections.abc import Sequence
+from itertools import groupby
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from trdlab.arrays import FloatArray
+from trdlab.explanations.solved import SolvedState
+from trdlab.gridworld import Gridworld
+from trdlab.gridworld.gridmap import MOVES
+from trdlab.gridworld.render import ABOVE_ROUTES, draw_map
+from trdlab.rollouts.episodes import Episode
+from trdlab.show.plots import bars, style
+from trdlab.show.plots.moment import (
+    EXPECTED,
+    PANEL,
+    explain_marks,
+    plot_moment,
+    possible_range,
+    without_noise,
+)
+from trdlab.show.scenes import Scene, scene_of
+from trdlab.tabular import ExactTable
+
+_MOST_ROUTE_STEPS = 1_000
+_LANES = (-0.12, 0.12)  # of the action's route and of the foil's, beside the middle of a cell
+_TALLEST = 3.2  # inches
+
+
+def solved_figure(solved: SolvedState) -> Figure:
+    """Returns the picture of a solved world: its map, and below it the bars of a state."""
+    choice, table, scene = solved.choice, solved.table, scene_of(solved.world, solved.state)
+    world = solved.world if isinstance(solved.world, Gridworld) else None
+    words = max(1.6 * len(scene.drawing.splitlines()), 3.0 + len(scene.legend))
+    top = 0.2 * words if world is None else map_height(world)
+    panels = 1 if choice.foil is None else 3
+    figure = style.new_figure(1.6 + top + PANEL * panels, scene.caption)
+    first, *rest = figure.subplots(1 + panels, 1, height_ratios=(top, *(PANEL,) * panels))
+    if world is None:
+        plot_scene(first, scene, solved.state)
+    else:
+        plot_map(first, world, table, solved.state, choice.action, choice.foil)
+    bound = float(table.solution.error_bound[solved.state].max())
+    moment = without_noise(choice.moment, bound)
+    plot_moment(rest, moment, choice.action, choice.foil, possible=possible_range(table))
+    rest[len(rest) // 2].set_ylabel(EXPECTED)
+    explain_marks(figure, moment, choice.action, choice.foil)
+    return figure
+
+
+def world_figure(world: Gridworld, state: int = 0) -> Figure:
+    """Returns the picture of a gridworld in one of its states."""
+    figure = style.new_figure(0.3 + map_height(world), world.grid.title)
+    draw_map(figure.subplots(), world, state)
+    return figure
+
+
+def map_height(world: Gridworld) -> float:
+    """Returns how many inches a map takes that is as wide as a picture, or as tall as is good."""
+    rows, columns = world.grid.shape
+    return min(_TALLEST, 0.9 * style.WIDTH * rows / columns)
+
+
+def plot_map(
+    ax: Axes, world: Gridworld, table: ExactTable, state: int, action: str, foil: str | None = None
+) -> Axes:
+    """Draws a state of a gridworld, the policy, and the route that each action leads to.
+
+    A route follows the likeliest outcome of the action, then of the policy's likeliest actions,
+    until the episode ends or comes back to where it was.
+
+    Args:
+        ax: the axes to draw on.
+        world: the gridworld.
+        table: its table; the routes follow its policy.
+        state: the index of the state.
+        action: the name of the explained action; its route is solid.
+        foil: the name of its foil; its route is dashed.
+
+    Returns:
+        `ax`.
+    """
+    draw_map(ax, world, state)
+    _draw_policy(ax, world, table, state)
+    colours, handles = style.action_colours(world.action_names), []
+    names = [action] if foil is None else [action, foil]
+    for name, dashes, lane in zip(names, (None, (2.2, 1.0)), _LANES, strict=False):
+        states = route(table, state, world.action_names.index(name))
+        drawn = plot_route(ax, world, states, colours[name], dashes=dashes, lane=lane)
+        drawn.set_label(f"route after {name}")
+        handles.append(drawn)
+    handles.append(bars.handle("the policy", "", ">", style.MUTED, style.MUTED))
+    place: Any = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 0.3}
+    ax.legend(handles=handles, ncols=3, frameon=False, fontsize=style.TEXT, **place)
+    return ax
+
+
+def plot_route(
+    ax: Axes,
+    world: Gridworld,
+    states: Sequence[int],
+    colour: str = style.INK,
+    *,
+    dashes: tuple[float, float] | None = None,
+    lane: float = 0.0,
+) -> Line2D:
+    """Draws a way over a map, on the ground: it hides nothing, and stops before what it leads to.
+
+    Args:
+        ax: the axes with the map.
+        world: the gridworld.
+        states: those that the way goes through.
+        colour: of the line.
+        dashes: how long they are, and how far apart; None for a solid line.
+        lane: how far beside the middle of the cells it goes.
+
+    Returns:
+        The line that was drawn.
+    """
+    places = [place for place, _ in groupby(world.states[state].place for state in states)]
+    points = np.array(places, dtype=np.float64)[:, ::-1] + 0.5 + lane  # [K, 2] of x, y
+    if len(points) > 1:
+        ahead = points[-1] - points[-2]
+        ahead /= max(np.abs(ahead).max(), 1.0)
+        if world.grid.cell(*places[-1]).kind != "floor":
+            points[-1] -= 0.53 * ahead + lane * np.abs(ahead)
+        head = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 14, "linewidth": 0}
+        head |= {"shrinkA": 0, "shrinkB": 0}
+        ax.annotate(
+            "", points[-1], points[-1] - 0.3 * ahead, arrowprops=head, zorder=ABOVE_ROUTES + 1.0
+        )
+        points[-1] -= 0.1 * ahead
+    line = "-" if dashes is None else (0, dashes)
+    (drawn,) = ax.plot(*points.T, color=colour, linestyle=line, linewidth=2.5, zorder=3)
+    return drawn
+
+
+def plot_scene(ax: Axes, scene: Scene, state: int) -> Axes:
+    """Writes the map of a state as text with its legend on `ax`, which is returned."""
+    ax.axis("off")
+    lines = [f"state {state}", *fill(scene.place, 36).splitlines(), *scene.legend]
+    ax.text(0.25, 1.0, scene.drawing, family="monospace", fontsize=17, ha="center", va="top")
+    left = 0.5 if scene.drawing else 0.3
+    ax.text(left, 1.0, "\n".join(lines), fontsize=style.TEXT, va="top", linespacing=1.4)
+    return ax
+
+
+def route(table: ExactTable, state: int, action: int) -> list[int]:
+    """Returns the states of the likeliest episode that begins with an action, until it repeats."""
+    mdp, policy = table.mdp, table.solution.policy
+    states = [state]
+    for _ in range(_MOST_ROUTE_STEPS):
+        row = states[-1] * mdp.num_actions + action
+        outcomes = slice(mdp.offsets[row], mdp.offsets[row + 1])
+        likeliest = mdp.offsets[row] + int(mdp.probabilities[outcomes].argmax())
+        following = int(mdp.next_states[likeliest])
+        ended = bool(mdp.terminated[likeliest])
+        if following in states[1:]:
+            return [*states, following]
+        if following != states[-1]:
+            states.append(following)
+        if ended:
+            break
+        action = int(policy[following].argmax())
+    return states
+
+
+def route_taken(table: ExactTable, episode: Episode) -> list[int] | None:
+    """Returns the states that an episode of a model went through; None if that cannot be told.
+
+    Episodes keep what was expected, not what was seen: of the states that an action can lead to,
+    that one is taken of which the same was expected.
+    """
+    mdp, components = table.mdp, table.decomposition.components
+    states = [mdp.start]
+    for step, action in enumerate(episode.actions):
+        row, is_last = states[-1] * mdp.num_actions + action, step + 1 == len(episode)
+        outcomes = np.arange(mdp.offsets[row], mdp.offsets[row + 1])
+        fits = (mdp.probabilities[outcomes] > 0.0) & (
+            mdp.terminated[outcomes] == (is_last and episode.terminated)
+        )
+        fits &= np.isclose(mdp.rewards[outcomes], episode.rewards[step])
+        following = np.unique(mdp.next_states[outcomes[fits]])
+        if not is_last:
+            seen = episode.decomposition.components[step + 1]  # [A, N+1]
+            following = following[(components[following] == seen).all(axis=(1, 2))]
+        if len(following) != 1:
+            return None
+        states.append(int(following[0]))
+    return states
+
+
+def _draw_policy(ax: Axes, world: Gridworld, table: ExactTable, state: int) -> None:
+    """Draws a small wedge at the edge of each cell through which the policy leaves it."""
+    wedges: list[FloatArray] = []
+    for index, at in enumerate(world.states):
+        if at.collected == world.states[state].collected and not world.is_terminal(index):
+            for action in np.flatnonzero(table.solution.policy[index]):
+                down, right = MOVES[action]
+                middle, ahead = np.array([at.column, at.row]) + 0.5, np.array([right, down])
+                side, back = 0.1 * ahead[::-1], middle + 0.38 * ahead
+                wedges.append(np.stack([middle + 0.47 * ahead, back - side, back + side]))
+    ax.add_collection(PolyCollection(wedges, facecolors=style.MUTED, linewidths=0, zorder=2))

@@ -1,0 +1,320 @@
+"""The verbs of the package: solve, train or name an agent, then calibrate, explain, compare it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from trdlab.errors import InputError, closest
+
+if TYPE_CHECKING:
+    from trdlab.agents.agent import Agent
+    from trdlab.agents.places import Where
+    from trdlab.deep.settings import Kind
+    from trdlab.deep.trainer import TrainMetrics
+    from trdlab.explanations.calibration.report import CalibrationReport
+    from trdlab.explanations.comparison.comparison import Comparison
+    from trdlab.explanations.explanation import Explanation
+    from trdlab.policies import Who
+    from trdlab.rollouts.playing import Watch
+
+
+def agent(
+    what: Any,
+    env: "Where | None" = None,
+    *,
+    env_arguments: Mapping[str, Any] | None = None,
+    gamma: float | None = None,
+    horizon: int | None = None,
+    width: int | None = None,
+    policy: "Who | None" = None,
+    name: str | None = None,
+    action_names: Sequence[str] | None = None,
+) -> "Agent":
+    """Returns an agent: who acts, where, and what it expects.
+
+    Args:
+        what: a run's folder, or `RUN@STEP` for an older checkpoint; `gridworld:drone`, a map file
+            or `tabular:FrozenLake-v1`, for the exact table of a model; a gridworld or another
+            model; a table that is solved already; any `Estimator`, such as one of your own; or an
+            agent.
+        env: where it acts, if that is not where it was made for: a Gymnasium id, an environment, a
+            function that makes one, or a model or its name. An estimator of your own needs it.
+        env_arguments: what to make the environment of an id with.
+        gamma: γ of a model's table, by default 0.95. Whatever else has its own, as it has N and w.
+        horizon: N of a model's table, by default 4.
+        width: w of a model's table, by default 1.
+        policy: who acts, where that is not the estimator's greedy policy: a `Policy`, or a function
+            from observations `[B, ...]` to action probabilities `[B, A]`.
+        name: what to call it.
+        action_names: A names, in place of those that the environment tells.
+
+    Raises:
+        InputError: there is no such agent, something does not fit it, or this is none; the message
+            says what is missing.
+
+    >>> agent("gridworld:drone").action_names
+    ('up', 'down', 'left', 'right')
+    """
+    from trdlab.agents.given import agent_of
+    from trdlab.agents.models import model_of
+    from trdlab.agents.naming import find_agent
+    from trdlab.agents.places import AXIS, as_words, changed
+    from trdlab.policies import acting
+
+    words, axis = as_words(env_arguments or {}), (gamma, horizon, width)
+    if isinstance(what, str | Path):
+        made = find_agent(
+            str(what), gamma=gamma, horizon=horizon, width=width, env=env, env_arguments=words
+        )
+    elif axis != (None, None, None) and model_of(what) is None:
+        raise InputError(
+            f"This {type(what).__name__} has its own γ, N and w.",
+            "Leave out `gamma`, `horizon` and `width`.",
+        )
+    else:
+        made = agent_of(what, env, words, changed(AXIS, *axis))
+    if policy is not None:
+        made = replace(made, policy=acting(policy))
+    if action_names is not None and len(action_names) != len(made.action_names):
+        raise InputError(
+            f"There are {len(action_names)} names for {len(made.action_names)} actions.",
+            "Give each action one.",
+        )
+    names = made.action_names if action_names is None else tuple(action_names)
+    return replace(made, name=name or made.name, action_names=names)
+
+
+def solve(what: Any, gamma: float = 0.95, horizon: int = 4, width: int = 1) -> "Agent":
+    """Solves a model exactly, and returns the agent that acts optimally in it.
+
+    Its `estimator` is the exact table: what every action of every state is worth, and when that
+    comes. No network is needed, and nothing is sampled.
+
+    Args:
+        what: the name of a built-in map, a map file, a gridworld or another model; or the id of an
+            environment with a transition table, such as `FrozenLake-v1`, or the environment.
+        gamma: γ, the discount factor, in [0, 1).
+        horizon: N, the number of explicit components.
+        width: w, the steps in each.
+
+    Raises:
+        InputError: there is no such model, or the environment has no transition table.
+
+    >>> print(solve("drone", horizon=2, width=2).estimator.decomposition[0, 1].components.round(2))
+    [0.95 1.76 0.81]
+    """
+    import gymnasium as gym
+
+    from trdlab.agents.exact import gridworld_agent, model_agent, tabular_agent
+    from trdlab.agents.models import TABULAR, is_model, model_of
+    from trdlab.gridworld import map_names
+    from trdlab.tabular import from_environment
+    from trdlab.tabular.toytext import toy_text_ids
+    from trdlab.time_axis import TimeAxis
+
+    axis = TimeAxis(gamma, horizon, width)
+    if isinstance(what, str | Path):
+        named, called = str(what), str(what).partition(",")[0]
+        if called in map_names() or (is_model(named) and not named.startswith(TABULAR)):
+            return gridworld_agent(named, axis)
+        if called in gym.registry or ":" in called or "/" in called:
+            return tabular_agent(named, axis)
+        known = closest(called, [*map_names(), *toy_text_ids()])
+        raise InputError(f"There is no map and no environment '{called}'.", known)
+    model = model_of(what)
+    if model is None and isinstance(what, gym.Env):
+        from_environment(what)  # says why there is no model of it
+    if model is None:
+        raise InputError(
+            f"This {type(what).__name__} is no model: it has no mdp and no table P.",
+            "Give a map, a gridworld, a model, or an environment that carries one.",
+        )
+    return model_agent(model, axis)
+
+
+def train(
+    env: str,
+    *,
+    kind: "Kind | None" = None,
+    preset: str | None = None,
+    out: str | Path | None = None,
+    on_metrics: "Callable[[TrainMetrics], None]" = lambda metrics: None,
+    **settings: Any,
+) -> "Agent":
+    """Trains a network that decomposes, in a new run's folder, and returns the run's agent.
+
+    Args:
+        env: a Gymnasium id with discrete actions, such as `CartPole-v1`, or an Atari game.
+        kind: `gym` or `atari`; by default whatever `env` names.
+        preset: the settings to begin from, such as `smoke`; by default those of the kind.
+        out: the run's folder; by default a new one in `runs`.
+        on_metrics: told of the score and the loss, now and then.
+        settings: single ones in place of the preset's, by the names that `trdlab train` gives them,
+            such as `agent_steps=20_000`, `horizon=10`, `hidden=[64]`.
+
+    Raises:
+        InputError: there is no such environment, preset or setting, or a value cannot be used.
+        OutputError: the folder exists, or cannot be written.
+    """
+    from trdlab.agents.runs import run_agent
+    from trdlab.training.run import begin, carry_on
+    from trdlab.training.setup import read_settings
+
+    if not isinstance(env, str):
+        raise InputError(
+            f"A run makes its environment again when it goes on, and a {type(env).__name__} has no "
+            "name.",
+            "Give a Gymnasium id; gymnasium.register names your own, as MODULE:ENV_ID.",
+        )
+    keys = {"horizon": "N", "width": "w"}
+    given = {keys.get(key, key): value for key, value in settings.items()}
+    chosen = read_settings(kind or _kind_of(env), env, preset, None, given)
+    with begin(chosen, None if out is None else Path(out)) as run:
+        carry_on(run, on_metrics=on_metrics)
+        path = run.folder.path
+    return run_agent(path)
+
+
+def calibrate(
+    agent: Any,
+    *,
+    episodes: int | None = None,
+    epsilon: float | None = None,
+    max_steps: int | None = None,
+    seed: int = 1000,
+    watch: "Watch | None" = None,
+) -> "CalibrationReport":
+    """Says how far ahead an agent's expectations can be trusted, by episodes that it plays.
+
+    Args:
+        agent: whatever `trdlab.agent` takes.
+        episodes: by how many it is judged; by default 300 of an exact table, 50 of another agent.
+        epsilon: the chance of a random action in them; by default none, or a little where all
+            episodes would be the same.
+        max_steps: after which an episode is cut off; by default as `usual_limit` says.
+        seed: of everything.
+        watch: told how far the episodes are, after every step.
+
+    Raises:
+        InputError: this is no agent, there is no episode, or ε is outside [0, 1).
+    """
+    from trdlab.explanations.assessment import assess, usual_episodes
+    from trdlab.rollouts.playing import unwatched, usual_limit
+
+    judged = _agent(agent)
+    return assess(
+        judged,
+        episodes=usual_episodes(judged) if episodes is None else episodes,
+        epsilon=epsilon,
+        max_steps=usual_limit(judged.estimator.time_axis) if max_steps is None else max_steps,
+        copying=judged.copying,
+        seed=seed,
+        watch=watch or unwatched,
+    )
+
+
+def explain(
+    agent: Any,
+    env: "Where | None" = None,
+    *,
+    seed: int = 0,
+    step: int = 0,
+    action: str | int | None = None,
+    foil: str | int | None = None,
+    parts: str | None = None,
+    episodes: int | None = None,
+    max_steps: int | None = None,
+    watch: "Watch | None" = None,
+    **how: Any,
+) -> "Explanation":
+    """Explains what an agent expects at a step of an episode of its own, and how far to trust that.
+
+    Args:
+        agent: whatever `trdlab.agent` takes.
+        env: where it acts, if that is not where it was made for.
+        seed: of the episode.
+        step: of that episode.
+        action: the name or number of the action to explain, by default what the agent does.
+        foil: of the one to contrast it with, by default the best other one.
+        parts: what is asked for, of forecast, contrast, episode and calibration, with commas
+            between; by default what matters most.
+        episodes: by how many other episodes it is judged, 0 for not at all; by default 300 of an
+            exact table, 50 of another agent.
+        max_steps: after which an episode is cut off; by default as `usual_limit` says.
+        watch: told how far the episodes are, after every step.
+        how: else, as for `trdlab.agent`.
+
+    Raises:
+        InputError: this is no agent, or there is no such step, action or part.
+    """
+    from trdlab.explanations.explanation import explain as explaining
+    from trdlab.explanations.explanation import parse_parts
+    from trdlab.rollouts.playing import unwatched
+
+    wanted = parse_parts(parts)
+    return explaining(
+        _agent(agent, env, **how),
+        wanted,
+        seed=seed,
+        step=step,
+        action=None if action is None else str(action),
+        foil=None if foil is None else str(foil),
+        episodes=episodes,
+        max_steps=max_steps,
+        watch=watch or unwatched,
+    )
+
+
+def compare(
+    first: Any,
+    second: Any,
+    env: "Where | None" = None,
+    *,
+    episodes: int | None = None,
+    seed: int = 0,
+    max_steps: int | None = None,
+    watch: "Watch | None" = None,
+    **how: Any,
+) -> "Comparison":
+    """Compares what two agents expect at the same states, when, and how far each can be trusted.
+
+    Args:
+        first: whatever `trdlab.agent` takes; both act where this one does.
+        second: likewise. An exact table takes γ, N and w of a run beside it.
+        env: where both act, if that is not where the first was made for.
+        episodes: how many each plays, and as many again to be judged by; by default 20 and 50, of
+            exact tables 50 and 300.
+        seed: of the first episode.
+        max_steps: after which an episode is cut off; by default as `usual_limit` says.
+        watch: told how far the episodes are, after every step.
+        how: else, as for `trdlab.agent`: γ, N and w of exact tables.
+
+    Raises:
+        InputError: one is no agent, or the two cannot be compared.
+    """
+    from trdlab.agents.naming import find_pair
+    from trdlab.explanations.comparison import comparing
+    from trdlab.rollouts.playing import unwatched
+
+    names = (first, second)
+    if all(isinstance(name, str | Path) for name in names):
+        pair = find_pair((str(first), str(second)), env=env, **how)
+    else:
+        pair = _agent(first, env, **how), _agent(second, env, **how)
+    return comparing.compare(
+        *pair, episodes=episodes, seed=seed, max_steps=max_steps, watch=watch or unwatched
+    )
+
+
+_agent = agent  # which some parameters are called, too
+
+
+def _kind_of(env: str) -> "Kind":
+    from trdlab.atari.names import find_game
+
+    try:
+        find_game(env)
+    except InputError:
+        return "gym"
+    return "atari"

@@ -1,7 +1,6 @@
 """Steps of an episode that turned out other than expected, and why."""
 
-from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -15,6 +14,37 @@ NEARLY = 1 / 4
 """The share of what moved from one step to another by which signs may be mixed there."""
 
 _TURNED = "At {step:step} {action} turned out {gap:number} {outcome:text} than expected"
+_ALIKE = "the total hardly changed."
+_SAYS = {
+    "turned-out": f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
+    "ended-early": (  # the future ended, which changed more than the reward did
+        f"{_TURNED}, mainly because {{ending:text}} while {{promised:rewards}} were still expected."
+    ),
+    "other-reward": (
+        f"{_TURNED}, mainly because {{reward:paid}} came where {{expected:number}} was expected."
+    ),
+    "no-reward": f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
+    "other-belief": (  # of a later component
+        f"{_TURNED}, mainly because what it expects {{component:when}} went from {{was:number}} to "
+        "{now:number}."
+    ),
+    "spread-out": (  # half of what speaks for the outcome lies at a step or before
+        f"{_TURNED}, spread over many steps: half of it {{by:within}}."
+    ),
+    "put-off": (
+        "At {step:step} {action} put off {worth:rewards}, now expected {to:when}, not "
+        f"{{origin:when}}; {_ALIKE}"
+    ),
+    "brought-forward": (
+        "At {step:step} {action} brought {worth:rewards} forward, now expected {to:when}, not "
+        f"{{origin:when}}; {_ALIKE}"
+    ),
+    "exchanged": (
+        "At {step:step} {action} gained {gain:number} {up:when} and lost {loss:number} "
+        f"{{down:when}}: {_ALIKE}"
+    ),
+}
+"""Of each kind of turn its sentence; each is one rule."""
 
 
 def surprise(played: Played, row: int) -> Claim:
@@ -28,80 +58,6 @@ def surprise(played: Played, row: int) -> Claim:
     return Claim(EPISODES.rules[kind], played, fields)
 
 
-# ---- more or less in all -----------------------------------------------------------------------
-
-
-@EPISODES.rule(f"{_TURNED}.")
-def turned_out(played: Played) -> Iterator[Fields]:
-    """Nothing is known of when, for there is no explicit component."""
-    yield from _of_kind(played, "turned-out")
-
-
-@EPISODES.rule(
-    f"{_TURNED}, mainly because {{ending:text}} while {{promised:rewards}} were still expected."
-)
-def ended_early(played: Played) -> Iterator[Fields]:
-    """The future ended, which changed more than the reward did."""
-    yield from _of_kind(played, "ended-early")
-
-
-@EPISODES.rule(
-    f"{_TURNED}, mainly because {{reward:paid}} came where {{expected:number}} was expected."
-)
-def other_reward(played: Played) -> Iterator[Fields]:
-    yield from _of_kind(played, "other-reward")
-
-
-@EPISODES.rule(f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.")
-def no_reward(played: Played) -> Iterator[Fields]:
-    yield from _of_kind(played, "no-reward")
-
-
-@EPISODES.rule(
-    f"{_TURNED}, mainly because what it expects {{component:when}} went from {{was:number}} to "
-    "{now:number}."
-)
-def other_belief(played: Played) -> Iterator[Fields]:
-    """Another reward is expected of a later component than before."""
-    yield from _of_kind(played, "other-belief")
-
-
-@EPISODES.rule(f"{_TURNED}, spread over many steps: half of it {{by:within}}.")
-def spread_out(played: Played) -> Iterator[Fields]:
-    """Many components changed; half of what speaks for the outcome lies at a step or before."""
-    yield from _of_kind(played, "spread-out")
-
-
-# ---- the same, at another step -----------------------------------------------------------------
-
-
-@EPISODES.rule(
-    "At {step:step} {action} put off {worth:rewards}, now expected {to:when}, not {origin:when}; "
-    "the total hardly changed."
-)
-def put_off(played: Played) -> Iterator[Fields]:
-    """As much is expected as before, but rewards, or costs, lie at a later step."""
-    yield from _of_kind(played, "put-off")
-
-
-@EPISODES.rule(
-    "At {step:step} {action} brought {worth:rewards} forward, now expected {to:when}, not "
-    "{origin:when}; the total hardly changed."
-)
-def brought_forward(played: Played) -> Iterator[Fields]:
-    """As much is expected as before, but rewards, or costs, lie at an earlier step."""
-    yield from _of_kind(played, "brought-forward")
-
-
-@EPISODES.rule(
-    "At {step:step} {action} gained {gain:number} {up:when} and lost {loss:number} {down:when}: "
-    "the total hardly changed."
-)
-def exchanged(played: Played) -> Iterator[Fields]:
-    """As much is expected as before, but more at one step and less at another."""
-    yield from _of_kind(played, "exchanged")
-
-
 # ---- what a step changed -----------------------------------------------------------------------
 
 
@@ -111,8 +67,12 @@ def _turns(played: Played) -> tuple[tuple[str, Fields], ...]:
     return tuple(_turn(played, row) for row in range(len(played.revision)))
 
 
-def _of_kind(played: Played, kind: str) -> Iterator[Fields]:
-    yield from (fields for name, fields in _turns(played) if name == kind)
+def _of_kind(kind: str, played: Played) -> list[Fields]:
+    return [fields for name, fields in _turns(played) if name == kind]
+
+
+for _kind, _says in _SAYS.items():
+    EPISODES.rule(_says, kind=_kind)(partial(_of_kind, _kind))
 
 
 def _turn(played: Played, row: int) -> tuple[str, Fields]:

@@ -20,10 +20,11 @@ from textwrap import fill
 from matplotlib import pyplot as plt
 
 from trdlab.decomposition import TimeAxis
-from trdlab.explanations import explain, gridworld_moment, sentence
+from trdlab.explanations import gridworld_moment
+from trdlab.explanations.moment.telling import sections
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.render import draw_map
-from trdlab.show.plots.moment import plot_components
+from trdlab.show.plots.bars import plot_components
 from trdlab.tabular import exact, undiscounted_totals
 
 from exercise import check
@@ -171,10 +172,10 @@ down - up
 
 # %%
 moment = gridworld_moment(world, table, start)
-explanation = explain(moment, action="down", foil="up")
-for finding in explanation.contrast:
-    said = sentence(finding, explanation)
-    print(fill(f"- {said}", width=80, subsequent_indent="  "))
+for section in sections(moment.choice("down", "up"))[:2]:
+    print(section.heading)
+    for sentence in section.sentences:
+        print(fill(f"- {sentence}", width=80, subsequent_indent="  "))
 
 # %% [markdown]
 # ## How much does the drone care about "sooner"?

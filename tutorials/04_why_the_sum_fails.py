@@ -15,7 +15,7 @@ from matplotlib import pyplot as plt
 
 from trdlab.decomposition import TimeAxis
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.show.plots.moment import plot_components
+from trdlab.show.plots.bars import plot_components
 from trdlab.tabular import WindowBuilder, exact, learn, operator_table
 
 from exercise import check

@@ -21,9 +21,10 @@ from trdlab.agents import Agent
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations import assess, explain, moment_at
-from trdlab.explanations.calibration.sentences import trust_sentences
-from trdlab.explanations.moment.sentences import sentence
+from trdlab.explanations import assess, moment_at
+from trdlab.explanations.calibration import claims
+from trdlab.explanations.calibration.faults import faults
+from trdlab.explanations.moment import telling
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
 from trdlab.show.plots.calibration import plot_trust
@@ -215,10 +216,11 @@ def agent(name, table, axis):
     )
 
 
-def say(texts):
-    """Prints sentences, one below the other."""
-    for text in texts:
-        print(textwrap.indent(textwrap.fill(text, 78), "  "))
+def say(sections):
+    """Prints the sentences of some sections, one below the other."""
+    for section in sections:
+        for sentence in section.sentences:
+            print(textwrap.indent(textwrap.fill(sentence, 78), "  "))
 
 
 agents = {
@@ -230,9 +232,9 @@ agents = {
 
 # %%
 for name, of in agents.items():
-    explanation = explain(moment_at(of, step=8))
+    told = telling.sections(moment_at(of, step=8).choice())
     print(f"{name}:")
-    say(sentence(finding, explanation) for finding in explanation.forecast)
+    say(section for section in told if section.name == "forecast")
 
 # %% [markdown]
 # Each of these texts could be true. Nothing that an agent *says* shows whether it is right. So
@@ -242,7 +244,7 @@ for name, of in agents.items():
 reports = {name: assess(of, episodes=300) for name, of in agents.items()}
 
 print("Dora's report says:")
-say(trust_sentences(reports["Dora"]))
+say(claims.sections(reports["Dora"]))
 
 # %% [markdown]
 # Dora's forecasts are better than a guess at every step. What lies beyond her horizon is told, and
@@ -252,7 +254,7 @@ say(trust_sentences(reports["Dora"]))
 # %%
 for name in ("Ada", "Ben", "Cleo"):
     print(f"{name}'s report says:")
-    say(trust_sentences(reports[name]))
+    say(claims.sections(reports[name]))
 
 # %%
 figure, axes = plt.subplots(2, 2, figsize=(11, 6), layout="constrained")
@@ -270,8 +272,8 @@ for ax, (name, report) in zip(axes.flat, reports.items(), strict=True):
 # of one step must be γ^w times component i − 1 of the next. For this it needs no rewards at all.
 #
 # - Ada "expects rewards 1 step too early". All her rewards are there, but in the wrong place.
-# - Ben's components "are discounted by" about 0.95 "and not by γ^w = 0.9025". He groups two steps,
-#   so from one component to the next two steps pass.
+# - Ben "discounts what comes 2 steps later by" about 0.95, "and not by 0.902", which is γ^w. He
+#   groups two steps, so from one component to the next two steps pass.
 # - Cleo "ignores where episodes end". What she adds there is what is expected at the start of the
 #   next one, all of it. (It is a little more than all, because in her log flights began anywhere.)
 #
@@ -308,15 +310,15 @@ REPAIRED = {
 }
 
 
-def faults(name, targets, axis, seed):
+def named(name, targets, axis, seed):
     """Returns the faults that a report names, after learning from a log of its own."""
     table = learn(targets, axis, record(seed))
-    found = assess(agent(name, table, axis), episodes=300, seed=seed).faults
-    return ", ".join(type(fault).__name__ for fault in found) or "none"
+    report = assess(agent(name, table, axis), episodes=300, seed=seed)
+    return ", ".join(fault.kind for fault in faults(report)) or "none"
 
 
 for name, (targets, axis) in REPAIRED.items():
-    print(f"{name:>4}, repaired: {faults(name, targets, axis, seed=0)}")
+    print(f"{name:>4}, repaired: {named(name, targets, axis, seed=0)}")
 
 # %% [markdown]
 # ## 6. Was it luck?
@@ -327,7 +329,7 @@ for name, (targets, axis) in REPAIRED.items():
 # %%
 print("log   " + "".join(f"{name:>16}" for name in TEAMS))
 for seed in range(1, 6):
-    row = [faults(name, *team, seed) for name, team in TEAMS.items()]
+    row = [named(name, *team, seed) for name, team in TEAMS.items()]
     print(f"{seed:3}   " + "".join(f"{found:>16}" for found in row))
 
 # %% [markdown]
@@ -347,11 +349,11 @@ def emil(log, axis, table):
 
 print("Emil's report says:")
 emils = assess(agent("Emil", learn(emil, PAIRS, log), PAIRS), episodes=300)
-say(trust_sentences(emils))
+say(claims.sections(emils))
 
 # %% [markdown]
 # No fault is named, and still the report is no good one: the skill is gone after a few steps, and
-# what is expected is half of what comes. Which line is it? That is exercise 6.3.
+# what is expected is little more than half of what comes. Which line is it? That is exercise 6.3.
 #
 # ## 8. Your own agent
 #

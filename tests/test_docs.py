@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -374,7 +375,8 @@ def shown_commands() -> list[str]:
         for block in blocks(page, "console")
         for line in block.splitlines()
     ]
-    return [line.removeprefix("$ ") for line in lines if line.startswith("$ trdlab")]
+    told = [line.removeprefix("$ ") for line in lines if line.startswith("$ trdlab")]
+    return [line for line in told if line != "trdlab --version"]  # which parses nothing else
 
 
 @pytest.mark.parametrize("command", shown_commands())
@@ -427,6 +429,17 @@ def test_the_python_that_is_shown_runs(
     for block in shown:
         exec(block, namespace)
     assert capsys.readouterr().out
+
+
+def test_the_readme_shows_what_the_command_prints() -> None:
+    """If this fails, paste what it prints now."""
+    words = shlex.split("gridworld --gamma 0.95 --N 2 --w 2")
+    command = [sys.executable, "-m", "trdlab", *words]
+    env = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
+    printed = subprocess.run(command, capture_output=True, encoding="utf-8", env=env, check=True)
+    lines = "\n".join(line.rstrip() for line in printed.stdout.splitlines())
+    [shown] = blocks(README, "text")
+    assert shown in lines
 
 
 def test_the_files_of_a_run_are_those_of_the_table(trained: Path) -> None:

@@ -268,10 +268,10 @@ def enough(count: int, reach: float, distance: float) -> int | None:
     400
     """
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        needed = count * np.square(np.float64(reach) / np.abs(distance))
+        needed = float(count * np.square(np.float64(reach) / np.abs(distance)))
     if not needed < _MOST:
         return None
-    unit = 10 ** int(np.log10(max(needed, 1.0)))
+    unit: int = 10 ** int(np.log10(max(needed, 1.0)))
     return int(np.ceil(needed / unit)) * unit
 
 

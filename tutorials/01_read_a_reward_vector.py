@@ -24,7 +24,8 @@ from trdlab.explanations import gridworld_moment
 from trdlab.explanations.moment.telling import sections
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.render import draw_map
-from trdlab.show.plots.bars import plot_components
+from trdlab.show.plots.moment import plot_components
+from trdlab.show.plots.style import action_colours
 from trdlab.tabular import exact, undiscounted_totals
 
 from exercise import check
@@ -121,11 +122,11 @@ print(f"down: components sum to {down.components.sum():.4f}, Q = {q_down:.4f}")
 # ## A picture of it
 
 # %%
-figure, axes = plt.subplots(2, sharey=True, figsize=(7, 4), layout="constrained")
-plot_components(axes[0], up.components, table.time_axis, colour="tab:orange")
-plot_components(axes[1], down.components, table.time_axis, colour="tab:blue")
-for ax, name in zip(axes, ("up", "down"), strict=True):
-    ax.set_title(name, loc="left")
+figure, axes = plt.subplots(2, sharey=True, figsize=(6, 4.2), layout="constrained")
+colours = action_colours(world.action_names)
+for ax, name, vector in zip(axes, ("up", "down"), (up, down), strict=True):
+    plot_components(ax, vector.components, table.time_axis, colour=colours[name])
+    ax.set_title(name, loc="left", pad=20)
 
 # %% [markdown]
 # ## Read the rewards themselves

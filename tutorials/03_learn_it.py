@@ -125,7 +125,7 @@ for n, reward in enumerate(tries, start=1):
     steady[n] = steady[n - 1] + 0.3 * (reward - steady[n - 1])
     shrinking[n] = shrinking[n - 1] + 1 / n * (reward - shrinking[n - 1])
 
-figure, ax = plt.subplots(figsize=(7, 2.6), layout="constrained")
+figure, ax = plt.subplots(figsize=(6, 2.6), layout="constrained")
 ax.plot(steady, color="tab:orange", label="α = 0.3")
 ax.plot(shrinking, color="tab:blue", label="α = 1/n")
 ax.axhline(0.9 * 4 - 0.05 * 4, color="black", lw=0.8, ls="--", label="true: 3.4")
@@ -261,7 +261,7 @@ for i in range(8):
 # column *exactly*, and `outcomes` gives the shares.
 
 # %%
-figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
+figure, ax = plt.subplots(figsize=(6, 2.8), layout="constrained")
 steps = np.arange(8)
 ax.bar(steps, right.components[:-1], color="tab:blue", label="component")
 ax.errorbar(

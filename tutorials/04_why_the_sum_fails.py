@@ -15,7 +15,8 @@ from matplotlib import pyplot as plt
 
 from trdlab.decomposition import TimeAxis
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.show.plots.bars import plot_components
+from trdlab.show.plots.moment import plot_components
+from trdlab.show.plots.style import action_colours
 from trdlab.tabular import WindowBuilder, exact, learn, operator_table
 
 from exercise import check
@@ -63,13 +64,12 @@ for seed in range(3):
 # further training will change anything.
 
 # %%
-figure, axes = plt.subplots(2, sharey=True, figsize=(7, 4), layout="constrained")
-plot_components(axes[0], truth[0, DOWN].components, AXIS, colour="tab:blue")
-plot_components(axes[1], down.components, AXIS, colour="tab:grey")
-for ax, how in zip(
-    axes, ("exact", "learned with the loss on the sum"), strict=True
-):
-    ax.set_title(f"down, {how}", loc="left")
+figure, axes = plt.subplots(2, sharey=True, figsize=(6, 4.2), layout="constrained")
+colour = action_colours(drone.action_names)["down"]
+shown = {"exact": truth[0, DOWN], "learned with the loss on the sum": down}
+for ax, (how, vector) in zip(axes, shown.items(), strict=True):
+    plot_components(ax, vector.components, AXIS, colour=colour)
+    ax.set_title(f"down, {how}", loc="left", pad=20)
 
 # %% [markdown]
 # ### Where it ends

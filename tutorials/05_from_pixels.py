@@ -22,7 +22,8 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.pixels import pictures
 from trdlab.rollouts.evaluation import evaluate
 from trdlab.tabular import exact
-from trdlab.training.setup import future, new_trainer, resolved
+from trdlab.training.machine import resolved
+from trdlab.training.setup import future, new_trainer
 
 from exercise import check
 
@@ -41,7 +42,7 @@ one_coin = next(
     i for i, state in enumerate(world.states) if len(state.collected) == 1
 )
 
-figure, axes = plt.subplots(1, 3, figsize=(7, 2.5), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(6, 2.5), layout="constrained")
 shown = {
     "the start": seen[0],
     "one coin later": seen[one_coin],
@@ -155,7 +156,7 @@ updates, error = (
     np.array([at for at, _ in history]),
     np.array([e for _, e in history]),
 )
-figure, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
+figure, ax = plt.subplots(figsize=(6, 3.2), layout="constrained")
 for i, label in enumerate(settings.time_axis.labels):
     ax.plot(updates, error[:, i], label=label)
 for copy in range(250, updates[-1], 250):

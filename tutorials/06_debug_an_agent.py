@@ -4,7 +4,7 @@
 # Lesson 5 ended with a warning: a good score is no proof that an agent's reward vectors are right.
 # For a game there is no exact table to compare with. But there is what *happens*. In this lesson
 # four teams describe the same autopilot. Three of them made a mistake that programmers really make,
-# each in one line. The score will not tell you who. A **trust report** will, and it will tell you
+# each in one line. The score will not tell you who. A **calibration** will, and it will tell you
 # what to look for in the code.
 #
 # You need [lesson 2](02_derive_it.md) and its law, and some of [lesson 3](03_learn_it.md). Allow
@@ -27,7 +27,8 @@ from trdlab.explanations.calibration.faults import faults
 from trdlab.explanations.moment import telling
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
-from trdlab.show.plots.calibration import plot_trust
+from trdlab.show.plots.calibration import plot_trust, trust_handles
+from trdlab.show.plots.style import add_legend
 from trdlab.tabular import exact
 from trdlab.tabular.episodes import ModelEnvironments
 
@@ -247,9 +248,8 @@ print("Dora's report says:")
 say(claims.sections(reports["Dora"]))
 
 # %% [markdown]
-# Dora's forecasts are better than a guess at every step. What lies beyond her horizon is told, and
-# how much that is. Nothing in the report speaks of a mistake. She is the one who is right. Now the
-# others:
+# Dora's forecasts are better than a guess at every step. How much comes later than she tells is
+# told, too. Nothing in the report speaks of a mistake. She is the one who is right. Now the others:
 
 # %%
 for name in ("Ada", "Ben", "Cleo"):
@@ -257,10 +257,11 @@ for name in ("Ada", "Ben", "Cleo"):
     say(claims.sections(reports[name]))
 
 # %%
-figure, axes = plt.subplots(2, 2, figsize=(11, 6), layout="constrained")
-for ax, (name, report) in zip(axes.flat, reports.items(), strict=True):
+figure, axes = plt.subplots(4, figsize=(6, 12), layout="constrained")
+for ax, (name, report) in zip(axes, reports.items(), strict=True):
     plot_trust(ax, report)
-    ax.set_title(name, loc="left", fontsize=11, fontweight="bold")
+    ax.set_title(name, loc="right", fontsize=11, fontweight="bold")
+add_legend(figure, trust_handles(reports["Ada"]))
 
 # %% [markdown]
 # **Look at the pictures first.** Ada's skill is gone from the first step on. Those of Ben and Cleo
@@ -272,10 +273,10 @@ for ax, (name, report) in zip(axes.flat, reports.items(), strict=True):
 # of one step must be γ^w times component i − 1 of the next. For this it needs no rewards at all.
 #
 # - Ada "expects rewards 1 step too early". All her rewards are there, but in the wrong place.
-# - Ben "discounts what comes 2 steps later by" about 0.95, "and not by 0.902", which is γ^w. He
+# - Ben "discounts what comes 2 steps later by" about 0.95, "and not by 0.903", which is γ^w. He
 #   groups two steps, so from one component to the next two steps pass.
-# - Cleo "ignores where episodes end". What she adds there is what is expected at the start of the
-#   next one, all of it. (It is a little more than all, because in her log flights began anywhere.)
+# - Cleo "ignores where episodes end". What she adds there is what the start of the next one
+#   promises, all of it. (It is a little more than all, because in her log flights began anywhere.)
 #
 # ## 5. Repair
 #
@@ -352,8 +353,8 @@ emils = assess(agent("Emil", learn(emil, PAIRS, log), PAIRS), episodes=300)
 say(claims.sections(emils))
 
 # %% [markdown]
-# No fault is named, and still the report is no good one: the skill is gone after a few steps, and
-# what is expected is little more than half of what comes. Which line is it? That is exercise 6.3.
+# No fault is named, and still the report is no good one: from some step on his forecasts are no
+# better than a guess, and he expects too little. Which line is it? That is exercise 6.3.
 #
 # ## 8. Your own agent
 #
@@ -379,9 +380,8 @@ say(claims.sections(emils))
 # %% [markdown]
 # ## Your turn
 #
-# **Exercise 6.1.** An agent has γ = 0.9 and groups of w = 4 steps. Its report says that components
-# are discounted by 0.81 from one to the next, and not by γ^w = 0.6561. Which power of γ does its
-# code use?
+# **Exercise 6.1.** An agent has γ = 0.9 and groups of w = 4 steps. Its report says that it
+# discounts what comes 4 steps later by 0.81, and not by 0.656. Which power of γ does its code use?
 
 # %%
 answer_1 = None  # replace with a whole number

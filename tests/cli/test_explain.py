@@ -25,7 +25,8 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(expla
     assert code == 0
     assert "drone · step 0 of the episode with seed 0 · down or up" in out
     assert "the future of the optimal policy" in out
-    assert "The forecast can be trusted over its whole horizon, to t+3." in out
+    assert "It scored 4 in its one episode" in out
+    assert "Its forecasts are better than a guess about what comes within 4 steps." in out
     assert "down is worth 3.52 and up 3.26." in out
     moments = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png"]
     names = [*moments, "episode-seed-0.png", "calibration.png"]
@@ -67,14 +68,14 @@ def test_the_story_of_an_episode_as_text_as_json_and_as_a_picture(explain):
 def test_a_calibration_as_text_and_as_json(explain):
     _, out, err = explain("gridworld:ledge", "--what", "calibration", "--N", 3, "--gamma", 0.9)
     assert "γ = 0.9, N = 3, w = 1" in out
-    assert "The forecast can be trusted over its whole horizon, to t+2." in out
+    assert "Its forecasts are better than a guess about what comes at any time." in out
     assert err == ""
     code, out, _ = explain("gridworld:ledge", "--what", "calibration", "--json", "--episodes", 50)
     data = json.loads(out)
     assert code == 0
     assert data["schema"] == "trdlab.explanations/1"
-    assert data["calibration"]["schema"] == "trdlab.trust/1"
-    assert data["calibration"]["episodes"] == 50
+    assert data["calibration"]["schema"] == "trdlab.trust/2"
+    assert data["calibration"]["judged"]["episodes"] == 50
     assert not Path("explanations").exists()
 
 
@@ -114,7 +115,7 @@ def test_a_run_in_another_environment(explain, trained):
     same = ("--env", "trdlab/DroneGridworld-v0", "--env-arg", "slip=0.9")
     code, out, _ = explain(trained, *same, "--what", "calibration", "--episodes", 12)
     assert code == 0
-    assert "It was judged by 12 episodes" in out
+    assert "Its forecasts were judged by 12 episodes" in out
     for env, why in (
         ("trdlab/LedgeGridworld-v0", "it has 8 states, and the agent knows 14 states"),
         ("CartPole-v1", "it has 4 float32, and the agent knows 14 states"),

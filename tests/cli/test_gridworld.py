@@ -85,10 +85,10 @@ def test_states_are_named_by_number_or_place(capsys: pytest.CaptureFixture[str])
 
 def test_ties_are_said_and_can_be_mixed(capsys: pytest.CaptureFixture[str]):
     _, out, _ = run(capsys, "gridworld", "--map", "tie")
-    assert "Left and right are equally good here, but their futures differ" in out
-    assert "the numbers follow the first." in " ".join(out.split())
+    assert "Left and right are equally good here, but pay differently" in out
+    assert "the agent takes left." in " ".join(out.split())
     _, out, _ = run(capsys, "gridworld", "--map", "tie", "--ties", "mixed")
-    assert "the numbers mix them evenly." in " ".join(out.split())
+    assert "the agent takes each equally often." in " ".join(out.split())
     assert "chosen 50 %" in out
 
 

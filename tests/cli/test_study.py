@@ -21,7 +21,7 @@ def kit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
         capsys, "make", "--out", str(tmp_path / "kit"), "--trials", "6", "--seed", "4"
     )
     assert (code, out) == (0, "")
-    assert err.count("Written: ") == 3
+    assert err.count("Written: ") == 5
     return tmp_path / "kit"
 
 
@@ -33,12 +33,29 @@ def test_a_class_is_scored(kit: Path, capsys: pytest.CaptureFixture[str]):
     code, out, err = run(capsys, *words, "--json")
     assert (code, err) == (0, "")
     data = json.loads(out)
-    counts = {name: of["right"] for name, of in data["readers"].items()}
+    group = data["groups"]["text"]
+    counts = {name: of["right"] for name, of in group["readers"].items()}
     assert counts == {"Ada": 6, "reader 1": 2, "reader 2": 6}
-    assert data["overall"]["right"] == 14
+    assert group["overall"]["right"] == 14
+    assert data["help"] is None
     code, out, _ = run(capsys, *words)
     assert code == 0
-    assert "14 of 18 answers are right (78 %); guessing gets 33 % on average." in out
+    assert "Readers of the text: 14 of 18 answers are right, 78 %" in out
+
+
+def test_both_groups_are_scored_and_one_is_picked(kit: Path, capsys: pytest.CaptureFixture[str]):
+    right = json.loads((kit / "answers.json").read_text())["answers"]
+    words = ("score", str(kit / "answers.json"), "--answers", right, "--q-answers", "AAAAAA")
+    _, out, _ = run(capsys, *words)
+    told = " ".join(out.split())
+    assert "The text helps: its readers are right more often" not in told  # 4 of 6 is p = 1/16
+    assert "Readers of the text: 6 of 6" in told
+    assert "Readers of Q alone: 2 of 6" in told
+    _, out, _ = run(capsys, *words, "--group", "text", "--json")
+    assert json.loads(out)["groups"].keys() == {"text"}
+    _, out, _ = run(capsys, *words[:2], "--answers", "AAAAAA", "--group", "q", "--json")
+    data = json.loads(out)
+    assert {name: of["overall"]["right"] for name, of in data["groups"].items()} == {"q": 2}
 
 
 @pytest.mark.parametrize(

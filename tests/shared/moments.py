@@ -6,6 +6,7 @@ import numpy as np
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
+from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.moment.exact import gridworld_moment
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.telling import sections
@@ -21,6 +22,13 @@ def moment(rows: list[list[float]], width: int = 1, gamma: float = GAMMA, **know
     axis = TimeAxis(gamma, len(rows[0]) - 1, width)
     parts = RewardDecomposition(np.array(rows, dtype=np.float64), axis)
     return Moment(parts, tuple("abcd"[: len(rows)]), Future("the optimal policy"), **known)
+
+
+def trusted(axis: TimeAxis, components: int, residual: bool = False) -> Trust:
+    """How far such forecasts can be trusted: so many explicit components, and the residual."""
+    bad = axis.horizon - components
+    status = (*("good",) * components, *("bad",) * bad, "good" if residual else "bad")
+    return Trust(axis, status)  # type: ignore[arg-type]
 
 
 def choice(

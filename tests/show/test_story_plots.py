@@ -60,12 +60,12 @@ def test_the_columns_are_steps_the_rows_are_steps_ahead_and_costs_have_a_colour(
 
 def test_moments_are_numbered_as_their_sentences_are():
     told = tell(played(500, TimeAxis(0.95, 40)))
-    figure = story_figure(told, "an episode")
-    marks = [text.get_text() for text in figure.axes[0].texts]
+    captions = ["It happened."] * len(told.moments)
+    figure = story_figure(told, "an episode", captions=captions)
+    marks = [text.get_text() for text in figure.axes[1].texts]
     assert ", ".join(marks) == ", ".join(str(i + 1) for i in range(len(told.moments)))
-    lines = figure.texts[-1].get_text().splitlines()
-    numbers = [line[0] for line in lines if line[0].isdigit()]
-    assert numbers == ", ".join(marks).split(", ")
+    lines = figure.legends[0].get_title().get_text().splitlines()
+    assert [line[0] for line in lines if line[0].isdigit()] == ", ".join(marks).split(", ")
 
 
 def test_what_is_not_to_be_trusted_is_faded():
@@ -77,5 +77,5 @@ def test_what_is_not_to_be_trusted_is_faded():
         plot_story(ax, below, told, trusted(axis, components, residual))
         veils.append(sum(patch.get_alpha() is not None for patch in ax.patches))
     assert veils == [0, 3]
-    text = story_figure(told, "", trusted(axis, 2)).texts[-1].get_text()
-    assert "faded: has not proved better than a guess" in text
+    figure = story_figure(told, trust=trusted(axis, 2))
+    assert "pale: not proved, or not tested" in figure.legends[0].get_title().get_text()

@@ -10,6 +10,7 @@ from trdlab.agents.models import is_model
 from trdlab.agents.places import Origin, Place, Where, find_place
 from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
+from trdlab.environments.naming import is_numbered
 from trdlab.errors import InputError
 from trdlab.rollouts.branches import Copying
 from trdlab.runs.folder import RunFolder
@@ -40,7 +41,7 @@ def run_agent(
         TrdlabError: something is torn.
     """
     from trdlab.training.loading import interface_of, load, run_settings
-    from trdlab.training.setup import use_threads
+    from trdlab.training.machine import use_threads
 
     folder = RunFolder.open(path)
     settings = run_settings(folder)
@@ -55,7 +56,10 @@ def run_agent(
         frames, per_second = environments.frame_skip, environments.frames_per_second
     finally:
         environments.close()
-    interface_of(folder).check_fits(found, place.name)
+    if settings.action_names and env is None:
+        found = found.named(settings.action_names)
+    known = interface_of(folder)
+    known.check_fits(found, place.name)
     at = "" if step is None else f"@{step}"
     origin = Origin(
         f"{path}{at}",
@@ -67,7 +71,7 @@ def run_agent(
     return Agent(
         name=f"{folder.path.name}{at}",
         estimator=estimator,
-        action_names=found.action_names,
+        action_names=(known if is_numbered(found.action_names) else found).action_names,
         make=place.make,
         seconds_per_step=frames / per_second if per_second else None,
         origin=origin if place.is_named else None,

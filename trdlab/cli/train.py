@@ -221,12 +221,15 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
     """Trains a run to its end or to the next signal, and evaluates it at the end."""
     from trdlab.cli.progress import TrainingProgress, stopping
     from trdlab.deep.memory import available_memory
+    from trdlab.environments.faults import EnvironmentFault
+    from trdlab.errors import OutputError
     from trdlab.show.training import duration, memory_line, updates_lines
     from trdlab.training.run import carry_on
 
     errors = _errors()
     with stopping() as stop, open_run() as run:
         path, settings = run.folder.path, run.trainer.settings
+        go_on = f"Go on: {run.folder.resume_command}"
         _say(errors, f"Run: {path}")
         _say(errors, memory_line(run.memory, available_memory()))
         for line in updates_lines(settings):
@@ -234,16 +237,19 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
         if run.problem is not None:
             _say(errors, f"{run.problem.cause} New episodes are begun in their place.")
         with TrainingProgress(errors, settings.agent_steps, run.trainer.agent_steps) as progress:
-            done = carry_on(
-                run,
-                on_metrics=progress.on_metrics,
-                on_step=progress.on_step,
-                should_stop=stop,
-            )
+            try:
+                done = carry_on(
+                    run,
+                    on_metrics=progress.on_metrics,
+                    on_step=progress.on_step,
+                    should_stop=stop,
+                )
+            except (EnvironmentFault, OutputError) as error:  # which can be mended from outside
+                raise type(error)(error.cause, f"{error.cure} {go_on}") from error
         steps = run.trainer.agent_steps
         if not done:
             _say(errors, f"Stopped and saved at {steps:,} agent steps.")
-            _say(errors, f"Go on: {run.folder.resume_command}")
+            _say(errors, go_on)
             raise typer.Exit(stop.code or 0)
     _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
     if settings.evaluate_episodes:

@@ -1,7 +1,7 @@
 """What an agent sees and can do in its environments, described and compared in one place."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import gymnasium as gym
@@ -66,6 +66,24 @@ class Interface:
         if named and self.action_names != other.action_names:
             return self.done, other.done
         return None
+
+    def named(self, action_names: Sequence[str]) -> "Interface":
+        """Returns the same, its actions called as people say.
+
+        Args:
+            action_names: A names.
+
+        Raises:
+            InputError: there are more or fewer.
+        """
+        count = len(self.action_names)
+        if len(action_names) != count:
+            raise InputError(
+                f"There are {len(action_names)} names for {count} actions: "
+                f"{', '.join(action_names)}.",
+                "Give one for each action.",
+            )
+        return replace(self, action_names=tuple(action_names))
 
     def check_fits(self, there: "Interface", name: str) -> None:
         """Checks that an agent which knows this sees and does the same in other environments.

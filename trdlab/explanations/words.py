@@ -15,10 +15,10 @@ __all__ = ["counted", "forms_of", "joined"]
 def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     """Returns the forms that a slot `{field:form}` of any sentence can take.
 
-    Numbers: `number` (2.71), `gives` and `pays` (gives 2.71, gives nothing, costs 0.5), `estimate`,
-    `percent`, `given` (by the user: all its digits), `roots`, `tenths`, `count`, `steps`,
-    `episodes`, `times`, `states`. What is said where a flag asks for it: `average` and `averages`
-    (unless it is sure), `worth`, `net`, `ties`.
+    Numbers: `number` (2.71), `size` (2.71, nothing), `gives` and `pays` (gives 2.71, gives nothing,
+    costs 0.5), `estimate`, `percent`, `chance` (a 5 % chance), `given` (by the user: all its
+    digits), `roots`, `tenths`, `count`, `steps`, `episodes`, `times`, `states`. What is said where
+    a flag asks for it: `average` and `averages` (unless it is sure), `worth`, `net`, `ties`.
     Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `span`
     (from one to another), `within` (up to a step: in the first step, within 4 steps), `next` (the
     next 4 steps), `step`.
@@ -54,8 +54,10 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "averages": _of(lambda are_sure: "" if are_sure else ", on average"),
         "worth": _of(lambda is_discounted: "worth " if is_discounted else ""),
         "tenths": _of(lambda x: f"{x:.1f}"),
+        "size": Form(lambda x, digits: said(x, digits) if x else "nothing", abs),
         "estimate": Form(_estimate, lambda estimate: float(estimate.value)),
         "percent": _of(lambda share: f"{percent(share)} %"),
+        "chance": _of(chance_of),
         "given": _of(plain),
         "roots": _of(lambda roots: joined([significant(root) for root in roots])),
         "count": _of(lambda count: f"{count:,}"),
@@ -115,6 +117,17 @@ def whens_of(axis: TimeAxis, components: Sequence[int]) -> list[str]:
         else:
             runs.append([i])
     return [span_of(axis, run[0], run[-1]) for run in runs]
+
+
+def chance_of(share: float) -> str:
+    """Returns a chance with its article.
+
+    >>> chance_of(0.05), chance_of(0.08), chance_of(0.11), chance_of(0.803)
+    ('a 5 % chance', 'an 8 % chance', 'an 11 % chance', 'an 80 % chance')
+    """
+    number = percent(share)
+    is_eight = number.startswith("8") or number.partition(".")[0] in ("11", "18")
+    return f"{'an' if is_eight else 'a'} {number} % chance"
 
 
 def counted(count: int, noun: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import CopyableEnvironments, Environments, NotCopyable, Step
+from trdlab.environments.faults import blamed
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
@@ -135,7 +136,9 @@ class Playing:
         self.environments, self.max_steps, self.steps = environments, max_steps, 0
         self._begins = stack is None
         if stack is None:
-            stack = FrameStack(environments.reset(), environments.stack, environments.padding)
+            with blamed("when it was reset"):
+                frames = environments.reset()
+            stack = FrameStack(frames, environments.stack, environments.padding)
         self.stack = stack
         self.running: BoolArray = np.full(environments.num_envs, max_steps != 0)
         self.finished: BoolArray = ~self.running
@@ -175,7 +178,8 @@ class Playing:
 
     def take(self, actions: IntArray) -> Step:
         """Takes a step with these actions `[B]`; where an episode has ended they do not count."""
-        step = self.environments.step(actions, active=self.running)
+        with blamed(f"at step {self.steps + 1} of an episode"):
+            step = self.environments.step(actions, active=self.running)
         self.steps += 1
         over = step.ended | (self.steps == self.max_steps)  # [B]
         self.finished, self.running = self.running & over, self.running & ~over

@@ -16,7 +16,7 @@ from trdlab.time_axis import TimeAxis
 
 T = TypeVar("T")
 
-_MOST_ERROR = 1e-6  # of the largest Q-value, beyond which it is not called exact
+_MOST_ERROR = 1e-6  # of the largest reward, beyond which it is not called exact
 
 
 @dataclass(frozen=True)
@@ -98,9 +98,9 @@ def axis_words(axis: TimeAxis) -> tuple[str, ...]:
 
 
 def _check(solved: SolvedState) -> tuple[str, bool]:
-    largest = float(abs(solved.table.solution.q_values).max())
+    largest = float(abs(solved.table.mdp.rewards).max(initial=0.0))
     summed = f"Components sum to Q (largest difference {solved.sum_error:.0e});"
     bound = f"{solved.error_bound:.0e}"
-    if solved.error_bound <= _MOST_ERROR * largest:
+    if solved.error_bound <= _MOST_ERROR * largest or not largest:
         return f"{summed} Q is exact to {bound} (proven).", True
     return f"{summed} γ is so close to 1 that Q is only known to {bound}.", False

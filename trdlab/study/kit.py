@@ -1,44 +1,71 @@
-"""The kit of a blind reading: a page to answer in, questions to print, answers for who asks."""
+"""The kit of a blind reading: pages to answer in, questions to print, answers for who asks."""
 
 import json
 import textwrap
 from base64 import b64encode
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
 from html import escape
+from itertools import chain
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, Literal
 
 from trdlab import __version__
 from trdlab.errors import OutputError
 from trdlab.files import write_json, write_whole
-from trdlab.study.candidates import CANDIDATES, LETTERS, TIME_AXIS, study_map
+from trdlab.study.candidates import CANDIDATES, LETTERS
+from trdlab.study.crossroads import LATE, SOON, TIME_AXIS
 from trdlab.study.trials import Trial
 
-SCHEMA = "trdlab.study/1"
-PAGE, QUESTIONS, ANSWERS = "study.html", "questions.txt", "answers.json"
+SCHEMA = "trdlab.study/2"
+ANSWERS = "answers.json"
+Group = Literal["text", "q"]
+GROUPS: dict[Group, str] = {"text": "Readers of the text", "q": "Readers of Q alone"}
+"""Who answers: those who read the text, and the control group, which sees the Q-values alone."""
+FILES: dict[Group, tuple[str, str]] = {
+    "text": ("study.html", "questions.txt"),
+    "q": ("study-q.html", "questions-q.txt"),
+}
 _TEMPLATE = Path(__file__).parent / "page.html"
 _WIDTH = 78
 _NO_BREAK = "\N{NO-BREAK SPACE}"
-_QUESTION = "Which agent is it?"
-_INTRO = (
-    "Three agents act on the same map. Each of them is rewarded for other things, and acts as is "
-    "best for itself:",
-    "Each trial shows what was printed about one of them at one moment, and asks which one it is. "
-    "You see neither the map nor the names of the actions: they are called P, Q, R and S, and what "
-    "is P in one trial may be R in another. The same agent may come up several times.",
-    f"t is the step taken now, t+3 is three steps later, and {TIME_AXIS.labels[-1]} is all that "
-    f"comes from t+{TIME_AXIS.num_steps} on. Soon is within about three steps, late is after that.",
-    "What is expected is what comes on average: a reward of 1 with a chance of 90 % is 0.90. "
-    "A reward that is expected later is worth less now: "
-    f"{100 * (1 - TIME_AXIS.gamma):.0f} % less for each step (γ = {TIME_AXIS.gamma:g}). "
-    "A cost is a reward below 0.",
+_TITLE = "Which agent is it?"
+_FIRST = "Three agents choose between four actions. Each of them does what is worth most to itself:"
+_RISK = (
+    f"Every action leads to a few rewards and to one danger. Soon is in {SOON[-1]} steps at most, "
+    f"late is in {LATE[0]} steps or more. Agents A and B risk more than they would with the next "
+    "best action. Agent C risks much less, for rewards that may come soon or late."
 )
+_NAMES = (
+    "What is called action P in one trial may be action R in another. The same agent may come up "
+    "several times. Each trial counts rewards in a unit of its own, so compare numbers only within "
+    "a trial."
+)
+_LATER = (
+    f"A reward is worth {100 * (1 - TIME_AXIS.gamma):.0f} % less now for each step that it comes "
+    f"later (γ = {TIME_AXIS.gamma:g})."
+)
+_INTRO: dict[Group, tuple[str, ...]] = {
+    "text": (
+        "Each trial shows what was printed about one of them at one choice, and asks which agent "
+        "it is.",
+        _RISK,
+        _NAMES,
+        f"{_LATER} On average means over many tries: 10 with a chance of 30 % is 3 on average.",
+    ),
+    "q": (
+        "Each trial shows what the four actions are worth to one of them at one choice (Q), and "
+        "asks which agent it is. If you cannot tell, guess.",
+        _RISK,
+        _NAMES,
+        f"{_LATER} Q is what an action pays on average, costs taken off.",
+    ),
+}
 
 
 def write_kit(folder: Path, trials: Sequence[Trial], seed: int) -> tuple[Path, ...]:
-    """Writes the page, the questions and the answers into a folder, and returns their paths.
+    """Writes pages and questions of both groups and the answers, and returns their paths.
 
     Args:
         folder: it is made if there is none.
@@ -53,10 +80,10 @@ def write_kit(folder: Path, trials: Sequence[Trial], seed: int) -> tuple[Path, .
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _unwritable(folder, error) from error
-    page, questions, answers = paths
-    write_whole(page, _writing(html(trials)))
-    write_whole(questions, _writing(text(trials)))
-    write_json(answers, key(trials, seed))
+    for group, names in FILES.items():
+        for name, write in zip(names, (html, text), strict=True):
+            write_whole(folder / name, _writing(write(trials, group)))
+    write_json(folder / ANSWERS, key(trials, seed))
     return paths
 
 
@@ -66,7 +93,7 @@ def kit_paths(folder: Path) -> tuple[Path, ...]:
     Raises:
         OutputError: one of them does, or the folder is a file.
     """
-    paths = tuple(folder / name for name in (PAGE, QUESTIONS, ANSWERS))
+    paths = tuple(folder / name for name in (*chain(*FILES.values()), ANSWERS))
     try:
         folder.resolve()  # raises where no folder can have this name
         is_file = folder.exists() and not folder.is_dir()
@@ -92,31 +119,49 @@ def key(trials: Sequence[Trial], seed: int) -> dict[str, Any]:
     }
 
 
-def text(trials: Sequence[Trial]) -> str:
+def text(trials: Sequence[Trial], group: Group = "text") -> str:
     """Returns the questions as plain text, to print or to read aloud."""
-    lines = ["WHICH AGENT IS IT?", ""]
-    first, *others = _INTRO
-    lines += [_wrapped(first), "", *_choices(), ""]
-    for paragraph in others:
+    choices = [_wrapped(c.about, f"  {c.letter}  ", "     ") for c in CANDIDATES]
+    lines = [_TITLE.upper(), "", _wrapped(_FIRST), "", *choices, ""]
+    for paragraph in _INTRO[group]:
         lines += [_wrapped(paragraph), ""]
     for number, trial in enumerate(trials, 1):
         lines += ["-" * _WIDTH, f"Trial {number} of {len(trials)}", ""]
-        for heading, sentences in trial.parts:
-            lines += [f"{heading}:", *(_wrapped(told, "  - ", "    ") for told in sentences), ""]
-        lines += [f"{_QUESTION}   {'   '.join(f'[ ] {letter}' for letter in LETTERS)}", ""]
+        lines += _sentences(trial) if group == "text" else _worths(trial)
+        lines += [f"{_TITLE}   {'   '.join(f'[ ] {letter}' for letter in LETTERS)}", ""]
     return "\n".join(lines)
 
 
-def html(trials: Sequence[Trial]) -> str:
+def html(trials: Sequence[Trial], group: Group = "text") -> str:
     """Returns the page: all in one file, which loads nothing and shows the score itself."""
-    first, *others = _INTRO
     about = (f"<dt>{c.letter}</dt><dd>{escape(c.about)}</dd>" for c in CANDIDATES)
-    intro = [_paragraph(first), f"<dl>{''.join(about)}</dl>", *map(_paragraph, others)]
+    intro = [_paragraph(_FIRST), f"<dl>{''.join(about)}</dl>", *map(_paragraph, _INTRO[group])]
+    sets = (_fieldset(trial, at, len(trials), group) for at, trial in enumerate(trials, 1))
     return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
         intro="\n".join(intro),
-        trials="\n".join(_fieldset(trial, at, len(trials)) for at, trial in enumerate(trials, 1)),
+        questions=FILES[group][1],
+        trials="\n".join(sets),
         key=_hidden(trials),
     )
+
+
+def _sentences(trial: Trial) -> Iterator[str]:
+    for heading, sentences in trial.parts:
+        yield f"{heading}:"
+        yield from (_wrapped(told, "  - ", "    ") for told in sentences)
+        yield ""
+
+
+def _worths(trial: Trial) -> Iterator[str]:
+    yield "What each action is worth (Q):"
+    wide = max(map(len, trial.worth.values()))
+    for name, worth in trial.worth.items():
+        yield f"  {name}   {worth.rjust(wide)}   {_note(trial, name)}".rstrip()
+    yield ""
+
+
+def _note(trial: Trial, name: str) -> str:
+    return {trial.action: "which it takes", trial.foil: "the next best"}.get(name, "")
 
 
 def _unwritable(folder: Path, error: Exception) -> OutputError:
@@ -124,12 +169,10 @@ def _unwritable(folder: Path, error: Exception) -> OutputError:
     return OutputError(f"Cannot make '{folder}': {reason}.", "Choose another `out`.")
 
 
-def _fieldset(trial: Trial, number: int, count: int) -> str:
+def _fieldset(trial: Trial, number: int, count: int, group: Group) -> str:
     lines = [f"<fieldset><legend>Trial {number} of {count}</legend>"]
-    for heading, sentences in trial.parts:
-        items = "".join(f"<li>{_unbroken(escape(told))}</li>" for told in sentences)
-        lines += [f"<h3>{escape(heading)}</h3>", f"<ul>{items}</ul>"]
-    lines += [f'<p class="ask">{_QUESTION}</p>', '<div class="choices">']
+    lines += _lists(trial) if group == "text" else _table(trial)
+    lines += [f'<p class="ask">{_TITLE}</p>', '<div class="choices">']
     lines += [
         f'<label><input type="radio" name="trial-{number}" value="{c.letter}">'
         f"<span><strong>{c.letter}</strong> {escape(c.about)}</span></label>"
@@ -138,28 +181,28 @@ def _fieldset(trial: Trial, number: int, count: int) -> str:
     return "\n".join([*lines, "</div></fieldset>"])
 
 
+def _lists(trial: Trial) -> Iterator[str]:
+    for heading, sentences in trial.parts:
+        items = "".join(f"<li>{_unbroken(escape(told))}</li>" for told in sentences)
+        yield f"<h3>{escape(heading)}</h3>\n<ul>{items}</ul>"
+
+
+def _table(trial: Trial) -> Iterator[str]:
+    yield "<table><caption>What each action is worth (Q)</caption>"
+    for name, worth in trial.worth.items():
+        cells = f'<td class="number">{escape(worth)}</td><td>{_note(trial, name)}</td>'
+        yield f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>'
+    yield "</table>"
+
+
 def _hidden(trials: Sequence[Trial]) -> str:
     """Returns the answers such that they cannot be read by accident."""
-    grid = study_map()
-    data = {
-        "answers": _answers(trials),
-        "reasons": [trial.reason for trial in trials],
-        "map": "\n".join(grid.rows),
-        "about": (
-            "S start, c coin, h hazard, T treasure, which ends the episode, # wall. "
-            f"A move slips sideways with a chance of {100 * grid.slip:.0f} %."
-        ),
-        "pays": [f"Agent {c.letter} gets {c.pays}." for c in CANDIDATES],
-    }
+    data = {"answers": _answers(trials), "reasons": [trial.reason for trial in trials]}
     return b64encode(json.dumps(data).encode()).decode()
 
 
 def _answers(trials: Iterable[Trial]) -> str:
     return "".join(trial.letter for trial in trials)
-
-
-def _choices() -> list[str]:
-    return [_wrapped(c.about, f"  {c.letter}  ", "     ") for c in CANDIDATES]
 
 
 def _paragraph(words: str) -> str:

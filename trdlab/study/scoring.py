@@ -1,4 +1,4 @@
-"""Scores of a blind reading, against what guessing gets."""
+"""Scores of a blind reading: each group against guessing, and the text against Q alone."""
 
 import json
 import re
@@ -9,21 +9,35 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from rich.console import Group, RenderableType
-from rich.table import Table
-from rich.text import Text
+import numpy as np
 
+from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
 from trdlab.files import read_json
-from trdlab.formatting import percent
-from trdlab.show.text import fit
-from trdlab.statistics import Estimate
+from trdlab.statistics import Estimate, bootstrap
 from trdlab.study.candidates import LETTERS
-from trdlab.study.kit import SCHEMA
+from trdlab.study.kit import GROUPS, SCHEMA, Group
 
 CHANCE = 1 / len(LETTERS)
 """How often a guess is right."""
 NO_ANSWER = "-"
+_PARTS = ("why", "promise", "instead")  # of what a trial says
+
+Answers = Mapping[str, str]
+"""The answers of readers by name, a letter for each trial."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """What was asked.
+
+    Args:
+        answers: the right ones, a letter for each trial.
+        texts: of each trial, the sentences that readers saw.
+    """
+
+    answers: str
+    texts: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -58,81 +72,171 @@ class Score:
 
 
 @dataclass(frozen=True)
-class Scores:
-    """What a class has answered.
+class GroupScores:
+    """What a group of readers has answered.
 
     Args:
-        answers: the right ones, a letter for each trial.
         readers: the score of each reader by name, in the order in which they were given.
         overall: of all answers together. Its interval takes them as independent of each other,
             though readers share the trials.
         trials: for each trial, how many readers gave each answer.
     """
 
-    answers: str
     readers: dict[str, Score]
     overall: Score
     trials: tuple[dict[str, int], ...]
 
+    def rates(self, answers: str) -> FloatArray:
+        """Returns, of each trial, the share of readers who were right."""
+        right = [of.get(letter, 0) for of, letter in zip(self.trials, answers, strict=True)]
+        return np.array(right) / len(self.readers)
 
-def score(answers: str, given: Mapping[str, str]) -> Scores:
+    def misled(self, answers: str) -> list[int]:
+        """Returns the trials of which a wrong answer was given more often than the right one."""
+        return [
+            i
+            for i, (given, right) in enumerate(zip(self.trials, answers, strict=True))
+            if any(of > given.get(right, 0) for x, of in given.items() if x != NO_ANSWER)
+        ]
+
+
+@dataclass(frozen=True)
+class Help:
+    """How much oftener readers of the text are right than readers of Q alone.
+
+    Args:
+        difference: of the shares of right answers, with the interval (95 %) that a bootstrap over
+            the trials gives.
+        p_value: the probability of so large a difference, or a larger one, if each trial were as
+            likely to speak for one group as for the other (an exact sign-flip test).
+    """
+
+    difference: Estimate
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Scores:
+    """What a class has answered.
+
+    Args:
+        key: what was asked.
+        groups: those that answered.
+        help: of the text, where both groups answered.
+    """
+
+    key: Key
+    groups: dict[Group, GroupScores]
+    help: Help | None
+
+
+def score(key: Key, given: Mapping[Group, Answers]) -> Scores:
     """Scores what readers answered.
 
     Args:
-        answers: the right ones, such as `ABCCBA`.
-        given: those of each reader, `-` for none.
+        key: what was asked.
+        given: the answers of each group's readers, such as `ABCCBA`, `-` for none.
 
     Raises:
         InputError: nobody answered, or somebody's answers are not one letter for each trial.
     """
-    if not given:
+    groups = {group: _group(key, given[group]) for group in GROUPS if given.get(group)}
+    if not groups:
         raise InputError("There are no answers.", "Give at least one reader's.")
+    text, q = (groups.get(group) for group in GROUPS)
+    found = None if text is None or q is None else _help(key, text, q)
+    return Scores(key, groups, found)
+
+
+def _group(key: Key, given: Answers) -> GroupScores:
+    total = len(key.answers)
     for name, letters in given.items():
-        _check(name, letters, len(answers))
+        _check(name, letters, total)
     right = {
-        name: sum(a == b for a, b in zip(letters, answers, strict=True))
+        name: sum(a == b for a, b in zip(letters, key.answers, strict=True))
         for name, letters in given.items()
     }
-    return Scores(
-        answers=answers,
-        readers={name: Score.of(found, len(answers)) for name, found in right.items()},
-        overall=Score.of(sum(right.values()), len(answers) * len(given)),
+    return GroupScores(
+        readers={name: Score.of(found, total) for name, found in right.items()},
+        overall=Score.of(sum(right.values()), total * len(given)),
         trials=tuple(dict(Counter(column)) for column in zip(*given.values(), strict=True)),
     )
 
 
-def read_answers(path: Path) -> str:
-    """Returns the right answers that the file of a kit holds.
+def _help(key: Key, text: GroupScores, q: GroupScores) -> Help:
+    ahead = text.rates(key.answers) - q.rates(key.answers)
+    difference = bootstrap(ahead, rng=np.random.default_rng(0))
+    whole = np.rint(ahead * len(text.readers) * len(q.readers)).astype(int)
+    return Help(difference, sign_flip(whole.tolist()))
+
+
+def sign_flip(differences: Iterable[int]) -> float:
+    """Returns how likely a sum is at least as large, if each difference had either sign.
+
+    >>> sign_flip([1, 1, 1]), sign_flip([1, -1]), sign_flip([0, 0])
+    (0.125, 0.75, 1.0)
+    """
+    told = list(differences)
+    sums = {0: 1.0}
+    for size in told:
+        flipped = dict.fromkeys([at + x for at in sums for x in (size, -size)], 0.0)
+        for at, p in sums.items():
+            for x in (size, -size):
+                flipped[at + x] += p / 2.0
+        sums = flipped
+    return sum(p for at, p in sums.items() if at >= sum(told))
+
+
+def read_key(path: Path) -> Key:
+    """Returns what the answers file of a kit holds.
 
     Raises:
         TrdlabError: it cannot be read, or is torn.
         InputError: it is no such file.
     """
     data = read_json(path)
-    answers = data.get("answers") if isinstance(data, dict) else None
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA or not _is_answers(answers):
+    is_key = isinstance(data, dict) and data.get("schema") == SCHEMA
+    if not is_key or not _is_answers(data.get("answers")) or not _are_trials(data):
         raise InputError(
             f"'{path}' does not hold the answers of a kit.",
             "Give the answers.json that `trdlab study make` wrote.",
         )
-    return str(answers)
+    texts = (tuple(told for part in _PARTS for told in trial[part]) for trial in data["trials"])
+    return Key(data["answers"], tuple(texts))
 
 
-def read_given(path: Path) -> dict[str, str]:
-    """Returns the answers of each reader from a file such as `{"Ada": "ABC", "Ben": "AB-"}`.
+def read_given(path: Path, group: Group | None = None) -> dict[Group, Answers]:
+    """Returns the answers of each group's readers from a file.
+
+    It holds `{"text": {"Ada": "ABC"}, "q": {"Ben": "AB-"}}`, or the readers of one group.
+
+    Args:
+        path: of a JSON file.
+        group: whose answers are asked for; that of the readers where the file does not say, by
+            default readers of the text.
 
     Raises:
         TrdlabError: it cannot be read, or is torn.
         InputError: it holds something else, or two readers of one name.
     """
     data = read_json(path)
-    if not isinstance(data, dict) or not all(isinstance(x, str) for x in data.values()):
+    grouped = isinstance(data, dict) and bool(data) and data.keys() <= GROUPS.keys()
+    given = data if grouped and _holds(data, dict) else {group or "text": data}
+    if not all(isinstance(of, dict) and _holds(of, str) for of in given.values()):
         raise InputError(
             f"'{path}' does not hold what readers answered.",
             'Write one object: a name and letters for each, {"Ada": "ABCABC…", …}.',
         )
     json.loads(path.read_bytes(), object_pairs_hook=_unique)
-    return {name: normal(letters) for name, letters in data.items()}
+    return {
+        name: {reader: normal(letters) for reader, letters in readers.items()}
+        for name, readers in given.items()
+        if group in (None, name)
+    }
+
+
+def _holds(data: Mapping[str, Any], kind: type) -> bool:
+    return all(isinstance(of, kind) for of in data.values())
 
 
 def normal(letters: str) -> str:
@@ -154,85 +258,6 @@ def unnamed(given: Iterable[str], named: Container[str]) -> dict[str, str]:
     return {name: normal(letters) for letters, name in zip(given, free, strict=False)}
 
 
-def page(scores: Scores, *, ascii_only: bool = False) -> RenderableType:
-    """Returns the scores as text: of all, of each reader, and of each trial.
-
-    Args:
-        scores: of a class.
-        ascii_only: for terminals without UTF-8.
-    """
-    overall = scores.overall
-    lines: list[RenderableType] = [
-        Text(
-            f"{overall.right} of {overall.total} answers are right "
-            f"({percent(overall.rate.value)} %); guessing gets {percent(CHANCE)} % on average.",
-            style="bold",
-        ),
-        Text(f"{_chance(overall)}\n"),
-        _readers(scores, ascii_only=ascii_only),
-        Text(""),
-        _trials(scores),
-    ]
-    return Group(*lines)
-
-
-def to_dict(scores: Scores) -> dict[str, Any]:
-    """Returns the scores as plain data; the schema is `trdlab.study-scores/1`."""
-    return {
-        "schema": "trdlab.study-scores/1",
-        "chance": CHANCE,
-        "overall": _score_to_dict(scores.overall),
-        "readers": {name: _score_to_dict(of) for name, of in scores.readers.items()},
-        "trials": [
-            {"answer": answer, "given": given}
-            for answer, given in zip(scores.answers, scores.trials, strict=True)
-        ],
-    }
-
-
-def _score_to_dict(of: Score) -> dict[str, Any]:
-    return {
-        "right": of.right,
-        "total": of.total,
-        "rate": of.rate.value,
-        "interval": [of.rate.low, of.rate.high],
-        "p_value": of.p_value,
-    }
-
-
-def _chance(of: Score) -> str:
-    return f"The chance to get at least {of.right} right by guessing is {_small(of.p_value)}."
-
-
-def _readers(scores: Scores, *, ascii_only: bool) -> Table:
-    table = _table("reader", "right", "share", "95 % interval", "by guessing")
-    for name, of in scores.readers.items():
-        low, high = percent(of.rate.low), percent(of.rate.high)
-        share = f"{percent(of.rate.value)} %"
-        cells = (name, f"{of.right}/{of.total}", share, f"{low}…{high} %", _small(of.p_value))
-        table.add_row(*(Text(fit(cell, ascii_only=ascii_only)) for cell in cells))
-    return table
-
-
-def _trials(scores: Scores) -> Table:
-    table = _table("trial", "answer", *LETTERS, "none")
-    for number, (answer, given) in enumerate(zip(scores.answers, scores.trials, strict=True), 1):
-        counts = (str(given.get(letter, 0)) for letter in (*LETTERS, NO_ANSWER))
-        table.add_row(str(number), answer, *counts)
-    return table
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=None, padding=(0, 3, 0, 0), header_style="bold", pad_edge=False)
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="right" if i else "left", no_wrap=bool(i))
-    return table
-
-
-def _small(p_value: float) -> str:
-    return "below 0.0001" if p_value < 1e-4 else f"{p_value:.2g}"
-
-
 def _unique(pairs: list[tuple[str, Any]]) -> None:
     """Checks that no two readers have the same name: a dict would keep one of them only."""
     for name, times in Counter(name for name, _ in pairs).items():
@@ -242,6 +267,15 @@ def _unique(pairs: list[tuple[str, Any]]) -> None:
 
 def _is_answers(answers: object) -> bool:
     return isinstance(answers, str) and bool(answers) and set(answers) <= set(LETTERS)
+
+
+def _are_trials(data: Mapping[str, Any]) -> bool:
+    trials = data.get("trials")
+    return (
+        isinstance(trials, list)
+        and len(trials) == len(data["answers"])
+        and all(isinstance(of, dict) and of.keys() >= {*_PARTS} for of in trials)
+    )
 
 
 def _check(name: str, letters: str, trials: int) -> None:

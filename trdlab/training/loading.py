@@ -11,16 +11,13 @@ from trdlab.deep.settings import TrainSettings
 from trdlab.environments import Environments, in_batches
 from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
-from trdlab.errors import OutputError, TrdlabError
+from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
 from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
 from trdlab.runs import RunFolder, read_arrays
-from trdlab.training.setup import (
-    future,
-    make_environments,
-    use_threads,
-)
+from trdlab.training.machine import use_threads
+from trdlab.training.setup import future, make_environments
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
@@ -120,9 +117,11 @@ def evaluate_run(
     settings = run_settings(folder)
     check_imported(settings.env)
     use_threads(settings)
+    chance = settings.evaluate_epsilon if epsilon is None else epsilon
+    if not 0.0 <= chance <= 1.0:  # nor is NaN
+        raise InputError(f"`epsilon` is {chance}.", "It lies from 0 to 1.")
     step, estimator = _loaded(folder, step)
     count = episodes or settings.evaluate_episodes or 30
-    chance = settings.evaluate_epsilon if epsilon is None else epsilon
     parts: list[Evaluation] = []
 
     def make(num_envs: int, seed: int) -> Environments:

@@ -17,7 +17,7 @@ from trdlab.explanations.calibration.calibration import calibrate
 from trdlab.explanations.calibration.ceiling import ceiling_of
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.rollouts.branches import Branching
-from trdlab.rollouts.counterfactual import counterfactual
+from trdlab.rollouts.counterfactual import compared, try_actions
 from trdlab.rollouts.episodes import Recording, collect
 from trdlab.statistics import Estimates
 from trdlab.tabular import ExactTable, ModelEnvironments, exact, from_environment
@@ -134,7 +134,7 @@ def test_a_counterfactual_contrast_agrees_with_the_exact_one():
     true = (table.decomposition[0, 1] - table.decomposition[0, 0]).components
     shares = []
     for seed in range(5):
-        found = counterfactual(branching, playing, 1, 0, seed=seed)
+        found = compared(try_actions(branching, playing, 1, 0, seed=seed), seed=seed)
         assert found.predicted == pytest.approx([*true, true.sum()])
         assert np.abs(found.observed.value - found.predicted).max() < 0.4
         shares.append(inside(found.observed, found.predicted))
@@ -147,9 +147,9 @@ def test_counterfactuals_refuse_what_is_not_there():
         Recording(table, environments).play_to(500)
     playing = Recording(table, environments).playing
     with pytest.raises(InputError, match="both 1"):
-        counterfactual(Branching(table), playing, 1, 1)
+        try_actions(Branching(table), playing, 1, 1)
     with pytest.raises(InputError, match=r"no action 7.*0 to 3"):
-        counterfactual(Branching(table), playing, 7, 1)
+        try_actions(Branching(table), playing, 7, 1)
     with pytest.raises(InputError, match="reach 12 steps"):
         Branching(table, steps=5)
     with pytest.raises(InputError, match="at least 2 of both"):

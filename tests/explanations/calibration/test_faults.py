@@ -14,8 +14,14 @@ from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations.calibration.consistency import Consistency, consistency_of
-from trdlab.explanations.calibration.faults import discount_exponent, faults, is_discount_wrong
-from trdlab.explanations.calibration.report import judge
+from trdlab.explanations.calibration.faults import (
+    amount_off,
+    discount_exponent,
+    faults,
+    is_discount_wrong,
+    off_from,
+)
+from trdlab.explanations.calibration.report import CalibrationReport, judge
 from trdlab.explanations.rules import Claim
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
@@ -108,7 +114,7 @@ def test_a_reward_shifted_by_one_step_is_named(name: str, seed: int):
         seed=seed,
     )
     (fault,) = diagnosed(episodes)
-    assert (fault.kind, fault.steps) == ("too-early", 1)
+    assert fault.sentence == "It expects rewards 1 step too early."
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -125,7 +131,7 @@ def test_a_forgotten_power_of_gamma_is_named(name: str, seed: int):
 def test_an_ignored_end_is_named(name: str, seed: int):
     for axis in (SINGLE, PAIRS):
         (fault,) = diagnosed(played(name, endless(name, axis), axis, seed))
-        assert fault.kind in ("goes-on-in-next", "goes-on-after-end")
+        assert fault.kind == "end-ignored"
         assert fault.share == pytest.approx(1.0, abs=0.2)
 
 
@@ -142,10 +148,47 @@ def test_what_is_expected_after_the_end_itself_is_seen():
         components = target(mdp.expected_rewards, axis.gamma, later + ends[..., None] * junk)
     components[mdp.terminal_states] = junk
     (fault,) = diagnosed(played("bridge", components, axis, 0))
-    assert fault.kind == "goes-on-after-end"
+    assert (fault.kind, fault.is_next) == ("end-ignored", False)
 
 
-# ---- the audit -----------------------------------------------------------------------------------
+# ---- what only looks like a fault ----------------------------------------------------------------
+
+
+def young(horizon: int, lengths: tuple[int, int], noise: float, seed: int) -> CalibrationReport:
+    """An agent paid 1 a step that has learned its first three components, and no later one."""
+    axis, rng = TimeAxis(0.9, horizon), np.random.default_rng(seed)
+    episodes = []
+    for _ in range(50):
+        total = int(rng.integers(*lengths, endpoint=True))
+        left = total - np.arange(total + 1)[:, None]  # [T+1, 1]
+        k = np.arange(horizon + 1)
+        rows = ((k < left) & (k < 3)) + noise * rng.normal(size=(total + 1, horizon + 1))
+        episodes.append(episode([1.0] * total, axis, rows * axis.discounts))
+    return judge(GREEDY, episodes)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    ("horizon", "lengths", "noise"), [(9, (10, 10), 0.02), (10, (10, 60), 0.1), (40, (20, 50), 0.2)]
+)
+def test_a_young_agent_expects_too_little_and_nothing_too_early(horizon, lengths, noise, seed):
+    report = young(horizon, lengths, noise, seed)
+    assert faults(report) == []
+    (late,) = off_from(report)
+    assert (late.span[0], late.amount) == (3, "too little")
+    (share,) = amount_off(report)
+    assert share.share < 0.7
+
+
+def test_what_a_young_agent_is_told():
+    report = young(8, (10, 10), 0.01, 0)
+    late, share = (*off_from(report), *amount_off(report))
+    assert late.sentence.startswith("It expects too little of what comes in 3 to 7 steps: ")
+    assert late.sentence.endswith(" on average, where 1.56 came.")
+    assert share.sentence == "Within 8 steps it expects 61 % of what comes."
+
+
+# ---- steps that fit each other -------------------------------------------------------------------
 
 
 def predicted(rows: list[list[float]], axis: TimeAxis, **changes: Any) -> Episode:

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from moments import GAMMA, choice, moment, of_kind, said, told
+from moments import GAMMA, choice, moment, of_kind, said, told, trusted
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.moment.exact import gridworld_moment
 from trdlab.explanations.moment.moment import Choice, moment_of
 from trdlab.explanations.moment.telling import in_brief
@@ -124,13 +123,12 @@ def test_what_depends_on_how_a_tie_was_broken_says_so():
     of = choice("tie")
     assert of.moment.tied == ("left", "right")
     assert said(of, "tied-actions") == [
-        "Left and right are equally good here, but their futures differ: the numbers follow the "
-        "first."
+        "Left and right are equally good here, but pay differently; the agent takes left."
     ]
     assert said(of, "different-totals") == [
-        "In total right pays 20 and left pays 19, with ties broken as here."
+        "In total right brings 20 and left 19, with ties broken as here."
     ]
-    assert "mix them evenly" in said(choice("tie", ties="mixed"), "tied-actions")[0]
+    assert "takes each equally often" in said(choice("tie", ties="mixed"), "tied-actions")[0]
 
 
 def test_ties_in_later_states_are_counted():
@@ -152,17 +150,17 @@ def test_a_loop_has_no_total():
 def test_totals_of_any_size_are_told_apart():
     world = parse_map("X = coin 1e-12 terminal\nY = treasure 4e-12 terminal\n---\nXS..Y")
     of = choice(Gridworld(world), action="left", foil="right")
-    assert said(of, "different-totals") == ["In total right pays 4e-12 and left pays 1e-12."]
+    assert said(of, "different-totals") == ["In total right brings 4e-12 and left 1e-12."]
     large = parse_map("X = coin 1e12 terminal\nY = treasure 1.001e12 terminal\n---\nXSY")
     assert said(choice(Gridworld(large)), "different-totals") == [
-        "In total right pays 1.001e+12 and left pays 1e+12."
+        "In total right brings 1.001e+12 and left 1e+12."
     ]
 
 
 def test_the_discount_is_told_where_it_decides_against_the_total():
     of = choice("tie", TimeAxis(0.9, 1))
-    assert [claim.sentence for claim in in_brief(of)[:2]] == [
-        "In total right pays 20 and left pays 19.",
+    assert [claim.sentence for claim in in_brief(of)[1:3]] == [
+        "In total right brings 20 and left 19.",
         "But each step of waiting makes a reward count 10 % less: left is worth 17.1, right 16.2.",
     ]
     assert not of_kind(of, "never-behind")  # which of them pays when lies in the residual
@@ -263,12 +261,19 @@ def test_next_to_nothing_is_no_lead():
 
 def test_a_difference_that_cannot_be_trusted_is_not_discussed():
     rows = [[0.0, 1.0, 0.0, 3.0], [0.5, 0.0, 0.0, 0.0]]  # |differences| 0.5, 1, 0, 3
-    trust = Trust(TimeAxis(GAMMA, 3), 3, 3, 3, residual=False)
-    of = moment(rows, trust=trust).choice("a", "b")
+    axis = TimeAxis(GAMMA, 3)
+    of = moment(rows, trust=trusted(axis, 3)).choice("a", "b")
     (doubt,) = of_kind(of, "untested-difference")
     assert doubt.share == pytest.approx(3.0 / 4.5)
+    assert doubt.sentence == (
+        "67 % of the difference between a and b comes in 3 steps or later, and that is not to be "
+        "trusted."
+    )
+    silent = replace(trusted(axis, 3), status=("good", "good", "good", "not tested"))
+    (untested,) = of_kind(moment(rows, trust=silent).choice("a", "b"), "untested-difference")
+    assert untested.sentence.endswith("and that was not tested.")
     assert not of_kind(of, "reasons")
-    sure = moment(rows, trust=replace(trust, residual=True)).choice("a", "b")
+    sure = moment(rows, trust=trusted(axis, 3, residual=True)).choice("a", "b")
     assert of_kind(sure, "reasons")
     assert not of_kind(sure, "untested-difference")
 

@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from moments import GAMMA, choice, moment, of_kind, said, told
+from moments import GAMMA, choice, moment, of_kind, said, told, trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.moment.forecast import forecast
 from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty
 from trdlab.gridworld import Gridworld, parse_map
@@ -109,8 +108,8 @@ def test_the_first_cost_is_the_first_step_that_can_cost_something():
 # ---- what was learned ------------------------------------------------------------------------
 
 
-def judged(row: list[float], trusted: int, residual: bool, **known: Any) -> Choice:
-    trust = Trust(TimeAxis(GAMMA, len(row) - 1), trusted, trusted, trusted, residual)
+def judged(row: list[float], good: int, residual: bool, **known: Any) -> Choice:
+    trust = trusted(TimeAxis(GAMMA, len(row) - 1), good, residual)
     return one(row, trust=trust, **known)
 
 
@@ -133,14 +132,12 @@ def test_small_components_of_what_was_learned_are_no_first_reward():
 
 
 @pytest.mark.parametrize(
-    ("amount", "trusted", "chance"),
+    ("amount", "good", "chance"),
     [(2.0, 4, 0.4), (0.5, 4, None), (-2.0, 4, None), (None, 4, None), (2.0, 3, None)],
 )
-def test_an_expected_reward_is_a_chance_only_where_one_reward_or_none_comes(
-    amount, trusted, chance
-):
+def test_an_expected_reward_is_a_chance_only_where_one_reward_or_none_comes(amount, good, chance):
     row = [0.0, 0.0, 0.0, 0.8 * GAMMA**3, 0.0, 0.0]
-    of = judged(row, trusted, False, only_reward=amount)
+    of = judged(row, good, False, only_reward=amount)
     assert [claim.chance for claim in of_kind(of, "put-at")] == (
         [] if chance is None else [pytest.approx(chance)]
     )
@@ -149,7 +146,7 @@ def test_an_expected_reward_is_a_chance_only_where_one_reward_or_none_comes(
 def test_no_chance_is_read_from_a_group():
     axis = TimeAxis(GAMMA, 2, 3)
     grouped = moment([[0.0, 0.8, 0.0]], width=3, only_reward=1.0)
-    of = replace(grouped, trust=Trust(axis, 2, 2, 2, residual=True)).choice("a")
+    of = replace(grouped, trust=trusted(axis, 2, residual=True)).choice("a")
     assert not of_kind(of, "put-at")
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import peak_prominences
 
+from moments import trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.moment.exact import gridworld_moment
 from trdlab.explanations.moment.forecast import forecast
 from trdlab.explanations.moment.moment import Moment
@@ -25,12 +25,10 @@ def noise(seed: int, size: float = 0.03) -> np.ndarray:
     return np.random.default_rng(seed).normal(0.0, size, len(STEPS))
 
 
-def learned(row: np.ndarray, width: int = 1, trusted: int | None = None, **known: object) -> Moment:
+def learned(row: np.ndarray, width: int = 1, good: int | None = None, **known: object) -> Moment:
     """A moment of one action that expects `row`, before the discount."""
     axis = TimeAxis(0.95, len(row) - 1, width)
-    trust = None
-    if trusted is not None:
-        trust = Trust(axis, trusted, trusted, trusted, residual=False)
+    trust = None if good is None else trusted(axis, good)
     components = RewardDecomposition((row * axis.discounts)[None], axis)
     return Moment(components, ("go",), Future("the greedy policy"), trust=trust, **known)  # type: ignore[arg-type]
 
@@ -119,9 +117,9 @@ def test_a_wide_peak_is_said_to_be_uncertain_or_drawn_out_but_not_of_what_is_exa
 def test_a_peak_is_not_told_of_what_rises_to_the_end_of_what_is_known():
     rising = STEPS / 40.0
     assert peaks(learned(rising), "go") == []
-    assert peaks(learned(bumps(8, 20), trusted=20), "go") == [8]  # t+20 is not to be trusted
-    assert peaks(learned(bumps(8, 20), trusted=21), "go") == [8]  # it may go on rising
-    assert peaks(learned(bumps(8, 20), trusted=23), "go") == [8, 20]
+    assert peaks(learned(bumps(8, 20), good=20), "go") == [8]  # t+20 is not to be trusted
+    assert peaks(learned(bumps(8, 20), good=21), "go") == [8]  # it may go on rising
+    assert peaks(learned(bumps(8, 20), good=23), "go") == [8, 20]
 
 
 def test_what_forecasts_are_off_by_is_no_peak():

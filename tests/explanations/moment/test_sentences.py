@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mutants
-from moments import told
+from moments import told, trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations.calibration.trust import Trust
@@ -111,8 +111,9 @@ def moments(draw: st.DrawFn) -> Moment:
         return decomposition.value + slope * (value - 0.95) * np.arange(actions)
 
     components = draw(st.integers(0, horizon))
-    trust = Trust(axis, components, horizon, draw(st.integers(0, components)), draw(st.booleans()))
-    foil_trust = Trust(axis, max(0, components - 1), horizon, 0, draw(st.booleans()))
+    trust = trusted(axis, components, draw(st.booleans()))
+    untested = tuple(draw(st.sampled_from(["good", "open", "not tested"])) for _ in rows[0])
+    foil_trust = Trust(axis, untested)
     off_by = [0.01, 0.2, 0.3, 0.5, 0.7, 2.0, 4.0, 9.0, np.nan, np.nan]
     errors = draw(st.permutations(off_by))[: horizon + 1]
     return Moment(
@@ -162,7 +163,7 @@ def of_learned() -> list[Choice]:
             bumps = sum(np.exp(-((steps - place) ** 2) / 4.0) for place in places)
             row = size * bumps + slope * (1.0 - steps / 40) + rng.normal(0.0, 0.02, 41)
             rows = np.stack([row, np.roll(row, 2)]) * axis.discounts
-            trust = Trust(axis, 36, 40, 36, residual=False)
+            trust = trusted(axis, 36)
             of = Moment(
                 RewardDecomposition(rows, axis),
                 NAMES[:2],
@@ -172,7 +173,7 @@ def of_learned() -> list[Choice]:
                 only_reward=2.2 * size,
                 seconds_per_step=0.1,
             )
-            near = replace(of, trust=Trust(axis, 1, 40, 1, residual=False))
+            near = replace(of, trust=trusted(axis, 1))
             result += [of.choice(*NAMES[:2]), near.choice(*NAMES[:2])]
     return result
 
@@ -182,7 +183,7 @@ def read_back(choice: Choice) -> None:
     found = check(" ".join(claim.sentence for claim in claims), [(CHOICES, choice)])
     assert [claim.sentence for claim in found] == [claim.sentence for claim in claims]
     for claim in (*claims, *in_brief(choice)):
-        assert len(claim.sentence.split()) <= 32, claim.sentence  # slots may hold several words
+        assert len(claim.sentence.split()) <= 36, claim.sentence  # slots may hold several words
     assert len(in_brief(choice)) <= 5
 
 

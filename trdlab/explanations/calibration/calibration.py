@@ -155,7 +155,7 @@ def _allowed(axis: TimeAxis, mean: FloatArray, variance: FloatArray) -> FloatArr
     scale = np.maximum(axis.discounts, np.finfo(np.float64).tiny) ** 2
     guess = (variance / scale)[~np.isnan(variance)]
     usual = SLACK * guess.mean() if guess.size else 0.0
-    return np.maximum((SLACK * mean) ** 2, usual * scale)
+    return np.asarray(np.maximum((SLACK * mean) ** 2, usual * scale))
 
 
 def _enough(count: int, skill: Estimate, constant: bool, missed: float, bias: float) -> int | None:
@@ -184,7 +184,8 @@ def _could_be_missed(
     """
     discounts = np.maximum(axis.discounts, np.finfo(np.float64).tiny)
     largest = np.abs(np.stack(ranges)[..., :-1] / discounts).max()
-    return np.array([unseen(int(count)) for count in num_episodes]) * largest * discounts
+    missed = np.array([unseen(count) for count in num_episodes.tolist()])
+    return np.asarray(missed * largest * discounts)
 
 
 def _sums(samples: Samples) -> tuple[FloatArray, BoolArray]:

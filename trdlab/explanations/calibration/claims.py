@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 from trdlab.explanations.calibration import faults
 from trdlab.explanations.calibration.faults import REPORTS, rule
 from trdlab.explanations.calibration.report import CalibrationReport
@@ -14,9 +12,12 @@ from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.calibration.verdicts import Judged, add_verdicts
 from trdlab.explanations.rules import Claim, Fields, every, first, plain_data
 from trdlab.explanations.sections import Section
+from trdlab.formatting import percent
 from trdlab.statistics import Estimate
 
 SCHEMA = "trdlab.trust/2"
+MOST_VERDICTS = 4
+"""Of more than so many, only the first and the last are told."""
 LITTLE = 0.1
 """A ceiling below this leaves little to know."""
 WORTH_SAYING = 0.005
@@ -42,35 +43,21 @@ def scored_always(report: CalibrationReport) -> Iterator[Fields]:
 
 @rule("It scored {returns:estimate} an episode, on average over {episodes:episodes}.")
 def scored(report: CalibrationReport) -> Iterator[Fields]:
-    if report.score.returns.low < report.score.returns.high:
-        yield _scored(report.score) | {"returns": report.score.returns}
+    returns = report.score.returns
+    if report.score.different > 1 and returns.low != returns.high:
+        yield _scored(report.score) | {"returns": returns}
 
 
-@rule(
-    "It scored {returns:number} an episode on average; of {episodes:episodes} only "
-    "{different:count} differ."
-)
-def scored_in_few(report: CalibrationReport) -> Iterator[Fields]:
-    if np.isnan(report.score.returns.low):
-        yield _scored(report.score) | {"different": report.score.different}
-
-
-@rule("{ended:count} of them ended before the limit of {limit:steps}.")
+@rule("{ended:text} of them ended before the limit of {limit:steps}.")
 def some_ended(report: CalibrationReport) -> Iterator[Fields]:
     score = report.score
-    if score.truncated and score.terminated and score.time_limit is not None:
-        yield {"ended": score.terminated, "limit": score.time_limit}
-
-
-@rule("None of them ended before the limit of {limit:steps}.")
-def none_ended(report: CalibrationReport) -> Iterator[Fields]:
-    score = report.score
-    if score.truncated and not score.terminated and score.time_limit is not None:
-        yield {"limit": score.time_limit}
+    if score.truncated and score.time_limit is not None:
+        yield {"ended": str(score.terminated or "none"), "limit": score.time_limit}
 
 
 def _scored(score: Score) -> Fields:
-    return {"returns": score.returns.value, "episodes": score.episodes}
+    of = {"episodes": score.episodes, "different": score.different}
+    return {"returns": score.returns.value} | of
 
 
 # ---- how far to trust it -------------------------------------------------------------------------
@@ -136,22 +123,14 @@ def cannot_be_known(report: CalibrationReport) -> Iterator[Fields]:
 
 @rule(
     "More can be known of what comes {component:when}: a perfect forecast removes "
-    "{ceiling:percent} of a guess's error, this one {skill:percent}."
+    "{ceiling:percent} of a guess's error, this one {removes:text}."
 )
 def is_not_known(report: CalibrationReport) -> Iterator[Fields]:
     for at, limit, skill in _limits(report):
-        if limit.high >= LITTLE and skill.high < limit.low and skill.value > 0.0:
-            yield {"component": at, "ceiling": limit.value, "skill": skill.value}
-
-
-@rule(
-    "More can be known of what comes {component:when}: a perfect forecast removes "
-    "{ceiling:percent} of a guess's error, this one nothing."
-)
-def nothing_is_known(report: CalibrationReport) -> Iterator[Fields]:
-    for at, limit, skill in _limits(report):
-        if limit.high >= LITTLE and skill.high < limit.low and skill.value <= 0.0:
-            yield {"component": at, "ceiling": limit.value, "skill": skill.value}
+        if limit.high >= LITTLE and skill.high < limit.low:
+            removes = f"{percent(skill.value)} %" if skill.value > 0.0 else "nothing"
+            numbers = {"ceiling": limit.value, "skill": skill.value}
+            yield {"component": at, "removes": removes} | numbers
 
 
 @rule(
@@ -174,7 +153,7 @@ def _limits(report: CalibrationReport) -> Iterator[tuple[int, Estimate, Estimate
 def _known(report: CalibrationReport) -> list[Claim]:
     """Returns what can be known, of the first component that is not good, or the last one."""
     at = min(report.trust.components, report.time_axis.horizon - 1)
-    found = every(report, cannot_be_known, is_not_known, nothing_is_known, as_good_as_can_be)
+    found = every(report, cannot_be_known, is_not_known, as_good_as_can_be)
     return [
         *first(report, no_chance, shared_chance),
         *(claim for claim in found if claim.component == at),
@@ -248,7 +227,7 @@ def sections(report: CalibrationReport) -> tuple[Section, ...]:
     wrong = (
         *faults.faults(report),
         *every(report, faults.overestimates, faults.underestimates),
-        *every(report, faults.off_from, faults.too_much, faults.too_little, faults.smeared),
+        *every(report, faults.off_from, faults.amount_off, faults.smeared),
     )
     later = every(report, expects_later, differs_later, *([would_suffice] if hidden else []))
     found = (
@@ -274,15 +253,17 @@ def in_brief(report: CalibrationReport) -> list[Claim]:
 
 
 def _trust(report: CalibrationReport) -> list[Claim]:
-    """Returns the verdicts in short, and that on the residual."""
+    """Returns the verdicts, of many those in short and that on the residual."""
     found = verdicts(report)
+    if len(found) <= MOST_VERDICTS:
+        return found
     return list(dict.fromkeys([*_in_short(found), found[-1]]))
 
 
 def _score(report: CalibrationReport) -> list[Claim]:
     return [
-        *first(report, scored_once, scored_always, scored, scored_in_few),
-        *first(report, some_ended, none_ended),
+        *first(report, scored_once, scored_always, scored),
+        *some_ended(report),
     ]
 
 

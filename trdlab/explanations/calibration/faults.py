@@ -9,7 +9,7 @@ from trdlab.explanations.calibration.consistency import Consistency
 from trdlab.explanations.calibration.errors import LEAST_SMEAR, is_off
 from trdlab.explanations.calibration.errors import SLACK as AMOUNT
 from trdlab.explanations.calibration.report import CalibrationReport
-from trdlab.explanations.rules import Claim, Fields, Language, every, first
+from trdlab.explanations.rules import Claim, Fields, Language, every
 from trdlab.explanations.words import forms_of
 from trdlab.statistics import Estimate
 
@@ -28,36 +28,17 @@ rule = REPORTS.rule
 # ---- timing and amount ---------------------------------------------------------------------------
 
 
-@rule("It expects rewards {steps:steps} too late.")
-def too_late(report: CalibrationReport) -> Iterator[Fields]:
-    if report.errors is not None and report.errors.shift > 0:
-        yield {"steps": report.errors.shift * report.time_axis.width}
+@rule("It expects rewards {steps:steps} too {late:text}.")
+def mistimed(report: CalibrationReport) -> Iterator[Fields]:
+    if report.errors is not None and (shift := report.errors.shift):
+        late = "late" if shift > 0 else "early"
+        yield {"steps": abs(shift) * report.time_axis.width, "late": late}
 
 
-@rule("It expects rewards {steps:steps} too early.")
-def too_early(report: CalibrationReport) -> Iterator[Fields]:
-    if report.errors is not None and report.errors.shift < 0:
-        yield {"steps": -report.errors.shift * report.time_axis.width}
-
-
-@rule("All in all it expects {times:number} times as much as comes {span:span}.")
-def too_much(report: CalibrationReport) -> Iterator[Fields]:
-    if (
-        report.errors is not None
-        and report.errors.amount.low > 1.0
-        and is_off(report.errors.amount)
-    ):
-        yield _explicit(report) | {"times": report.errors.amount.value}
-
-
-@rule("All in all it expects {share:percent} of what comes {span:span}.")
-def too_little(report: CalibrationReport) -> Iterator[Fields]:
-    if (
-        report.errors is not None
-        and report.errors.amount.high < 1.0
-        and is_off(report.errors.amount)
-    ):
-        yield _explicit(report) | {"share": report.errors.amount.value}
+@rule("{span:span} it expects {share:percent} of what comes.")
+def amount_off(report: CalibrationReport) -> Iterator[Fields]:
+    if report.errors is not None and is_off(report.errors.amount):
+        yield {"span": (0, report.time_axis.horizon - 1), "share": report.errors.amount.value}
 
 
 @rule(
@@ -83,8 +64,7 @@ def off_from(report: CalibrationReport) -> Iterator[Fields]:
 
 @rule("It spreads rewards over the steps before and after, more than their timing is uncertain.")
 def smeared(report: CalibrationReport) -> Iterator[Fields]:
-    found = report.errors
-    if found is not None and found.smear.low > LEAST_SMEAR and not found.shift:
+    if report.errors is not None and report.errors.smear.low > LEAST_SMEAR and not faults(report):
         yield {"smear": report.errors.smear}
 
 
@@ -123,20 +103,13 @@ def discount_off(report: CalibrationReport) -> Iterator[Fields]:
         yield {"width": axis.width, "measured": measured, "right": right}
 
 
-@rule(
-    "It ignores where episodes end: it counts in {share:percent} of what the start of the next one "
-    "promises."
-)
-def goes_on_in_next(report: CalibrationReport) -> Iterator[Fields]:
+@rule("It ignores where episodes end: it counts in {share:percent} of what {what:text}.")
+def end_ignored(report: CalibrationReport) -> Iterator[Fields]:
     found = report.consistency
-    if found is not None and is_end_ignored(found) and found.past_reset.low > 0.5:
-        yield {"share": found.past_end.value}
-
-
-@rule("It ignores where episodes end: it counts in {share:percent} of what it expects after that.")
-def goes_on_after_end(report: CalibrationReport) -> Iterator[Fields]:
-    if report.consistency is not None and is_end_ignored(report.consistency):
-        yield {"share": report.consistency.past_end.value}
+    if found is not None and is_end_ignored(found):
+        is_next = found.past_reset.low > 0.5
+        what = "the start of the next one promises" if is_next else "it expects after that"
+        yield {"share": found.past_end.value, "what": what, "is_next": is_next}
 
 
 def faults(report: CalibrationReport) -> list[Claim]:
@@ -155,10 +128,7 @@ def faults(report: CalibrationReport) -> list[Claim]:
     Args:
         report: on the forecasts.
     """
-    return [
-        *every(report, too_late, too_early, discount_off),
-        *first(report, goes_on_in_next, goes_on_after_end),
-    ]
+    return every(report, mistimed, discount_off, end_ignored)
 
 
 def is_discount_wrong(found: Consistency) -> bool:
@@ -188,7 +158,3 @@ def _exponent(discount: float, gamma: float) -> float:
     if math.isnan(discount) or gamma == 0.0:
         return math.nan
     return math.log(discount) / math.log(gamma) if discount > 0.0 else math.inf
-
-
-def _explicit(report: CalibrationReport) -> Fields:
-    return {"span": (0, report.time_axis.horizon - 1)}

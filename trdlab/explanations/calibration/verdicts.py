@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import groupby
 from typing import Literal, NamedTuple, TypeVar
 
-from trdlab.explanations.calibration.calibration import Calibration
+from trdlab.explanations.calibration.calibration import Calibration, Status
 from trdlab.explanations.rules import Fields, Language, Rule
 from trdlab.statistics import FEWEST_EPISODES
 
@@ -52,6 +52,9 @@ _SAYS: dict[Kind, str] = {
     "silent": "{whose:text} about what comes {span:span} were not tested: no reward came then.",
     "unseen": "{whose:text} about what comes {span:span} were not tested: {unseen:text}.",
 }
+
+
+_CONSTANT: dict[Status, Kind] = {"good": "right", "bad": "wrong", "open": "unsure"}
 
 
 def add_verdicts(
@@ -101,7 +104,7 @@ def _kind(told: Calibration, i: int) -> Kind:
     if told.status[i] == "not tested":
         return "silent" if told.constant[i] else "unseen"
     if told.constant[i]:
-        return {"good": "right", "bad": "wrong", "open": "unsure"}[told.status[i]]
+        return _CONSTANT[told.status[i]]
     if told.status[i] == "open":
         return "too-few" if told.num_episodes[i] < FEWEST_EPISODES else "unsure"
     return "better" if told.status[i] == "good" else "no-better"

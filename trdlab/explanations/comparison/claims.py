@@ -21,7 +21,14 @@ FURTHEST = 3
 def in_brief(comparison: Comparison) -> list[Claim]:
     """Returns who expects more, when, whether they would do the same, and whom to trust."""
     told = _how_much(comparison) + _when(comparison)[:1] + every(comparison, agreement)
-    return list(at_first([*told, *every(comparison, trusted)[:2]]))
+    trust = [every(comparison, trusted)[i:][1:2] for i in _begins(comparison)]
+    return list(at_first([*told, *(claim for claims in trust for claim in claims)]))
+
+
+def _begins(comparison: Comparison) -> list[int]:
+    """Returns where what is said of the reports of A, and of B, begins."""
+    sides = [claim.side for claim in every(comparison, trusted)]
+    return [sides.index(side) for side in SIDES if side in sides]
 
 
 def sections(comparison: Comparison) -> tuple[Section, ...]:
@@ -237,7 +244,7 @@ def trusted(comparison: Comparison) -> Iterator[Fields]:
     """What matters most of the calibration of each."""
     for side, report in zip(SIDES, comparison.reports, strict=True):
         for claim in [] if report is None else in_brief_of_report(report):
-            yield {"side": side, "said": claim.sentence}
+            yield {"side": side, "said": claim.sentence[0].lower() + claim.sentence[1:]}
 
 
 @COMPARISONS.rule(

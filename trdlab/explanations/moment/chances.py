@@ -57,7 +57,7 @@ def give_or_take(choice: Choice) -> Iterator[Fields]:
             yield {"action": action, "value": value, "deviation": deviation}
 
 
-@CHOICES.rule("There is a {chance:percent} chance that {action} {reward:pays} {component:when}.")
+@CHOICES.rule("There is {chance:chance} that {action} {reward:pays} {component:when}.")
 def either_or(choice: Choice) -> Iterator[Fields]:
     """A step that pays one amount or nothing; of several, where most of it is expected.
 

@@ -37,7 +37,7 @@ def contrast(choice: Choice) -> list[Claim]:
         return nothing
     worth = every(choice, equal_totals, different_totals, no_total)
     worth += first(choice, better_by_discount, better_against_total, better, equal_values)
-    if alike := first(choice, same_components):
+    if alike := first(choice, same_rewards, same_components):
         return alike + worth
     if doubt := every(choice, untested_difference):
         return worth[-1:] + doubt + worth[:-1]
@@ -54,8 +54,7 @@ def in_brief(choice: Choice) -> list[Claim]:
     """Returns who is ahead and why, and what the discount has to do with it."""
     told = contrast(choice)
     kinds = [claim.kind for claim in told]
-    turn = next((c for c in reversed(told) if c.kind in ("overtakes", "makes-up")), None)
-    brief = told[:1] if turn is None or turn is told[0] else [told[0], turn]
+    brief = told[:1] + [c for c in told[1:] if c.kind in ("overtakes", "makes-up")]
     if {"better-by-discount", "better-against-total"} & set(kinds):
         return brief + [c for c in told if c.kind in _BY_DISCOUNT]
     return brief + [c for c in told if c.kind in ("better", "equal-values") and c not in brief]
@@ -66,7 +65,7 @@ _BY_DISCOUNT = ("different-totals", "better-by-discount", "better-against-total"
 # ---- what is paid in total, and what that is worth now -------------------------------------------
 
 
-@CHOICES.rule("Both pay {total:number} in total{averages:averages}{ties:ties}.")
+@CHOICES.rule("Both bring {total:number} in total{averages:averages}{ties:ties}.")
 def equal_totals(choice: Choice) -> Iterator[Fields]:
     if choice.foil is not None and not is_by_discount(choice):
         a, b = (choice.moment.total(name) for name in (choice.action, choice.foil))
@@ -75,7 +74,8 @@ def equal_totals(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "In total {more} {more_total:pays} and {less} {less_total:pays}{averages:averages}{ties:ties}."
+    "In total {more} brings {more_total:number} and {less} {less_total:number}"
+    "{averages:averages}{ties:ties}."
 )
 def different_totals(choice: Choice) -> Iterator[Fields]:
     for more, less in choice.orders:
@@ -154,7 +154,21 @@ def nothing_on_average(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule("{action} and {foil} lead to the same rewards at the same times{averages:averages}.")
+def same_rewards(choice: Choice) -> Iterator[Fields]:
+    """All that comes is told step by step."""
+    for fields in _alike(choice):
+        row = choice.moment.components(fields["action"])
+        if choice.time_axis.width == 1 and row[-1] == 0.0:
+            yield fields
+
+
+@CHOICES.rule("Nothing in these numbers tells {action} and {foil} apart.")
 def same_components(choice: Choice) -> Iterator[Fields]:
+    if not any(same_rewards(choice)):
+        yield from _alike(choice)
+
+
+def _alike(choice: Choice) -> Iterator[Fields]:
     for action, foil in choice.orders[:1]:
         if not choice.moment.difference(action, foil).any():
             yield {"action": action, "foil": foil, "averages": are_sure(choice)}
@@ -184,12 +198,12 @@ def untested_difference(choice: Choice) -> Iterator[Fields]:
     "{worse_sum:pays}{averages:averages}."
 )
 def decided_at(choice: Choice) -> Iterator[Fields]:
-    """Most of all that differs lies at one explicit component, and speaks for the better action."""
+    """Most of all that differs lies at one component, and speaks for the better action."""
     for fields in better_of(choice):
         a, b = fields["better"], fields["worse"]
         delta = choice.moment.difference(a, b)
         i = int(delta.argmax())
-        if i < choice.time_axis.horizon and delta[i] >= _DECIDES * np.abs(delta).sum():
+        if choice.time_axis.horizon and delta[i] >= _DECIDES * np.abs(delta).sum():
             rows = (choice.moment.components(a), choice.moment.components(b))
             yield {
                 "component": i,
@@ -213,7 +227,7 @@ def more_immediate(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "{leader} costs less: {leader_cost:number} {last_step:within}, where {other} costs "
+    "{leader} costs less: {leader_cost:size} {last_step:within}, where {other} costs "
     "{other_cost:number}{averages:averages}."
 )
 def costs_less(choice: Choice) -> Iterator[Fields]:

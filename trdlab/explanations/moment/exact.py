@@ -12,6 +12,7 @@ from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.reach import reached
 from trdlab.tabular.uncertainty import outcomes, spread
 
+_ROUNDING = 1e-9  # of a total: sums of many steps that differ by less are the same
 GAMMA_RANGE = (0.01, 0.99)
 MAX_SPREAD = 10_000_000  # states times steps, beyond which spread is not worked out
 MAX_WHAT_IF_STATES = 2_000  # each quantity takes a hundred solves
@@ -31,28 +32,38 @@ def tabular_moment(
         what_ifs: quantities that can be varied.
     """
     solution, mdp = table.solution, table.mdp
-    here = bool(table.ambiguous[state])
+    totals = undiscounted_totals(mdp, solution.policy)  # [S, A]
+    ambiguous = table.ambiguous | _totals_differ(totals, solution.tied)
+    here = bool(ambiguous[state])
     tied = zip(action_names, solution.tied[state] & here, strict=True)
     return Moment(
         decomposition=table.decomposition[state],
         action_names=tuple(action_names),
         future=table.future,
         policy=solution.policy[state],
-        totals=_totals(table, state),
+        totals=_totals(table, totals[state], state),
         stays=_stays(mdp, state),
         is_over=bool(mdp.terminal_states[state]),
         tied=tuple(name for name, is_tied in tied if is_tied),
-        tied_later=int((table.ambiguous & _later(table, state)).sum()) - here,
+        tied_later=int((ambiguous & _later(table, state)).sum()) - here,
         what_ifs=tuple(what_ifs),
         uncertainty=_uncertainty(table, state),
     )
 
 
-def _totals(table: ExactTable, state: int) -> FloatArray:
-    """Returns `[A]`: the undiscounted totals, 0 where rewards and costs cancel but for rounding."""
-    totals = undiscounted_totals(table.mdp, table.solution.policy)[state]
+def _totals(table: ExactTable, totals: FloatArray, state: int) -> FloatArray:
+    """Returns undiscounted totals `[A]`, 0 where rewards and costs cancel but for rounding."""
     size = np.abs(table.decomposition.components[state]).sum(axis=-1)  # [A]
     return np.where(np.abs(totals) <= RELATIVE_ZERO * size, 0.0, totals)
+
+
+def _totals_differ(totals: FloatArray, tied: BoolArray) -> BoolArray:
+    """Returns `[S]`: where actions that tie have different totals."""
+    known = tied & ~np.isnan(totals)
+    least = np.where(known, totals, np.inf).min(axis=1)
+    most = np.where(known, totals, -np.inf).max(axis=1)
+    size = np.maximum(np.abs(least), np.abs(most))
+    return np.asarray((known.sum(axis=1) > 1) & (most - least > _ROUNDING * size))
 
 
 def _stays(mdp: MDP, state: int) -> tuple[float, ...]:

@@ -96,8 +96,8 @@ def first_reward(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "After {action} the first {effect:text} can come {component:when}: {amount:number}, with a "
-    "{chance:percent} chance."
+    "After {action} the first {effect:text} can come {component:when}: {amount:number}, with "
+    "{chance:chance}."
 )
 def first_chance(choice: Choice) -> Iterator[Fields]:
     """That step pays, or costs, one amount or none."""
@@ -107,8 +107,7 @@ def first_chance(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "After {action} the first {effect:text} can come {component:when}, with a {chance:percent} "
-    "chance."
+    "After {action} the first {effect:text} can come {component:when}, with {chance:chance}."
 )
 def first_of_several(choice: Choice) -> Iterator[Fields]:
     """That step pays, or costs, different amounts."""

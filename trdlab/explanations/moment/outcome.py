@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from trdlab.explanations.rules import Claim, Fields, Form, Language, every, first, plain_data
+from trdlab.explanations.rules import Claim, Fields, Form, Language, every, plain_data
 from trdlab.explanations.sections import Section
 from trdlab.explanations.words import forms_of
 from trdlab.rollouts.counterfactual import Counterfactual
@@ -40,6 +40,11 @@ class Trial:
         """The name of the other."""
         return self.action_names[self.found.foil]
 
+    @property
+    def is_seen(self) -> bool:
+        """Whether something is known of what came."""
+        return not np.isnan(self.found.observed.value[-1])
+
     def gaps(self) -> Iterator[Fields]:
         """Yields each difference that was forecast, and what came: at components, then in all.
 
@@ -57,17 +62,9 @@ class Trial:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the numbers and the claims as plain data at full precision."""
-        found = self.found
-        return {
-            "action": self.action,
-            "foil": self.foil,
-            "copies": found.copies,
-            "whole": found.whole,
-            "same_every_time": found.same_every_time,
-            "predicted": plain_data(found.predicted),
-            "observed": plain_data(found.observed),
-            "findings": [claim.to_dict() for claim in _told(self)],
-        }
+        names = {"action": self.action, "foil": self.foil}
+        told = {"findings": [claim.to_dict() for claim in _told(self)]}
+        return {**plain_data(self.found), **names, **told}
 
 
 def _forms(trial: Trial) -> dict[str, Form]:
@@ -96,29 +93,13 @@ rule = TRIALS.rule
 
 # ---- how often -----------------------------------------------------------------------------------
 
-_TRIED = "{action} and {foil} were each tried {copies:times} from here"
 
-
-def _who(trial: Trial) -> Fields:
-    return {"action": trial.action, "foil": trial.foil, "copies": trial.found.copies}
-
-
-@rule(f"{_TRIED}, but cut off before anything could come.")
-def not_seen(trial: Trial) -> Iterator[Fields]:
-    if np.isnan(trial.found.observed.value[-1]):
-        yield _who(trial)
-
-
-@rule(f"{_TRIED}, and each brought the same every time.")
-def always_the_same(trial: Trial) -> Iterator[Fields]:
-    if trial.found.same_every_time:
-        yield _who(trial)
-
-
-@rule(f"{_TRIED}.")
-def tried_often(trial: Trial) -> Iterator[Fields]:
-    if not trial.found.same_every_time:
-        yield _who(trial)
+@rule("{action} and {foil} were each tried {copies:times} from here{how:text}.")
+def tried(trial: Trial) -> Iterator[Fields]:
+    how = ", and each brought the same every time" if trial.found.same_every_time else ""
+    if not trial.is_seen:
+        how = ", but cut off before anything could come"
+    yield {"action": trial.action, "foil": trial.foil, "copies": trial.found.copies, "how": how}
 
 
 # ---- whether what was forecast came --------------------------------------------------------------
@@ -247,12 +228,12 @@ def in_brief(trial: Trial) -> list[Claim]:
 def _told(trial: Trial) -> tuple[Claim, ...]:
     order, furthest = _outcomes(trial), _furthest(trial)
     told = [claim for claim in order if claim.component is None or claim.component in furthest]
-    return (*told, *first(trial, not_seen, always_the_same, tried_often))
+    return (*told, *tried(trial))
 
 
 def _outcomes(trial: Trial) -> list[Claim]:
     """Returns what came in all, and then of each component."""
-    if np.isnan(trial.found.observed.value[-1]):
+    if not trial.is_seen:
         return []
     found = every(trial, *_OUTCOMES)
     return sorted(found, key=lambda claim: -1 if claim.component is None else claim.component)

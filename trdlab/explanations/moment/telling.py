@@ -27,9 +27,9 @@ def in_brief(choice: Choice) -> list[Claim]:
     if choice.moment.is_over:
         return every(choice, episode_is_over)
     told = contrast.in_brief(choice) if choice.foil is not None else every(choice, no_alternative)
-    if told and told[0].kind.startswith("nothing"):
-        return told
     ties = first(choice, tied_actions, tied_later)
+    if told and told[0].kind.startswith("nothing"):
+        return told + ties
     flips = first(choice, sensitivity.flips)
     return list(at_first([*told, *ties, *forecast.forecast(choice)[:1], *flips]))
 
@@ -65,10 +65,12 @@ def no_alternative(choice: Choice) -> Iterator[Fields]:
         yield {"others": tuple(name for name in names if name != choice.action)}
 
 
-@CHOICES.rule("{actions:names} are equally good here, but their futures differ: {told:text}.")
+@CHOICES.rule("{actions:names} are equally good here, but pay differently; the agent {takes:text}.")
 def tied_actions(choice: Choice) -> Iterator[Fields]:
     if choice.moment.tied:
-        yield {"actions": choice.moment.tied, "told": _told_of_ties(choice)}
+        is_mixed = "mixes" in choice.moment.future.policy
+        takes = "takes each equally often" if is_mixed else f"takes {choice.moment.tied[0]}"
+        yield {"actions": choice.moment.tied, "takes": takes}
 
 
 @CHOICES.rule(
@@ -93,8 +95,3 @@ def counted_as(choice: Choice) -> Iterator[Fields]:
 @CHOICES.rule("It looks ahead to {ending:text}.")
 def ended_by(choice: Choice) -> Iterator[Fields]:
     yield {"ending": choice.moment.future.ending}
-
-
-def _told_of_ties(choice: Choice) -> str:
-    is_mixed = "mixes" in choice.moment.future.policy
-    return "the numbers mix them evenly" if is_mixed else "the numbers follow the first"

@@ -20,8 +20,8 @@ CUT = "cut"
 
 _MOST_LETTERS = 46  # of all numbers above one row of bars
 _MOST_CUTS = 4  # whiskers that are cut get a number each; of more only the furthest does
-_SWAMPS = 12.0  # times the largest explicit component, from which on a residual is cut off
-_MATTERS = 0.05  # of the residual: explicit components that add up to less do not set the scale
+_SWAMPS = 25.0  # times the largest explicit component, from which on a residual is cut off
+_MATTERS = 0.01  # of the residual: explicit components that add up to less do not set the scale
 _ROOM = 1.5  # times the largest explicit component, that is shown then
 _REACH = 2.5  # times the bars, beyond which whiskers are cut off
 _MARGIN = 0.08  # of the scale, free at both ends
@@ -90,7 +90,6 @@ def plot_components(
     *,
     colour: str | tuple[str, str] = style.EXPECTED,
     scale: Scale | None = None,
-    faded: BoolArray | None = None,
 ) -> Axes:
     """Draws a bar per component: explicit ones filled, the residual hatched and set apart.
 
@@ -103,7 +102,6 @@ def plot_components(
         axis: what they mean.
         colour: of the bars; of a difference, that of positive and that of negative ones.
         scale: what the axes show; by default all that is drawn.
-        faded: `[N+1]`, what is not to be trusted.
 
     Returns:
         `ax`.
@@ -117,7 +115,7 @@ def plot_components(
         how = {"xycoords": ax.get_xaxis_transform(), "gid": None if is_whole else CUT}
         style.note(ax, text, (x, 1.0), (0, 3), ha="center", **how)
     colours = [up if value > 0.0 else down for value in components]
-    draw_bars(ax, components, axis, colours, scale, faded=faded, told=bool(texts))
+    draw_bars(ax, components, axis, colours, scale, told=bool(texts))
     return ax
 
 
@@ -144,7 +142,6 @@ def draw_bars(
     colours: list[str],
     scale: Scale,
     *,
-    faded: BoolArray | None = None,
     told: bool = False,
     offset: float = 0.0,
     width: float = 0.8,
@@ -154,8 +151,6 @@ def draw_bars(
     lines = (heights != 0.0).astype(float)  # no line where there is no bar
     bars = ax.bar(places, heights, width, color=colours, edgecolor=colours, linewidth=lines)
     bars[-1].set(facecolor="white", hatch="////")
-    for bar, is_faded in zip(bars, [False] * len(bars) if faded is None else faded, strict=True):
-        bar.set_alpha(style.FADED if is_faded else None)
     for i in np.flatnonzero(~scale.holds(components)).tolist():
         _cut(ax, places[i], components[i], scale, colours[i], is_told=told)
 
@@ -170,9 +165,12 @@ def draw_whiskers(
     known = np.isfinite(ends).all(axis=0)
     x, ends = x[known], ends[:, known]
     ax.vlines(x, *np.clip(ends, *scale), color=style.INK, linewidth=1.2)
-    for row in ends:
+    gone = (ends[0] > scale.high) | (ends[1] < scale.low)  # all of it, on one side
+    far = np.abs(ends).argmax(axis=0)  # [K]
+    for which, row in enumerate(ends):
         inside, out = scale.holds(row), np.flatnonzero(~scale.holds(row))
         ax.plot(x[inside], row[inside], "_", color=style.INK, markersize=5, zorder=4)
+        out = out[~gone[out] | (far[out] == which)]  # then its far end alone
         telling = out if len(out) <= _MOST_CUTS else out[[np.abs(row[out]).argmax()]]
         for i in out:
             _cut(ax, x[i], row[i], scale, style.INK, is_told=i not in telling)
@@ -185,11 +183,6 @@ def draw_whiskers(
 def residual_handle() -> Patch:
     """Returns what a legend shows of the residual."""
     return Patch(fc="white", ec=style.MUTED, hatch="////", label="hatched: all later steps")
-
-
-def faded_handle() -> Patch:
-    """Returns what a legend shows of what is not to be trusted."""
-    return Patch(color=style.MUTED, alpha=style.FADED, label="pale: not proved, or not tested")
 
 
 def handle(

@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration.reliability import Reliability
@@ -16,9 +15,9 @@ from trdlab.show.plots import bars, style
 from trdlab.time_axis import axis_title, step_label
 
 _LOWEST = -0.5  # skill below this is an arrow at the edge; the lowest with its number
-_GROUNDS = {style.TRUSTED: "better than a guess", style.WRONG: "no better", style.OPEN: "open"}
 
 
+@style.settings()
 def trust_figure(report: CalibrationReport, title: str = "") -> Figure:
     """Returns the skill of every component, and how far a forecast can be trusted.
 
@@ -32,7 +31,7 @@ def trust_figure(report: CalibrationReport, title: str = "") -> Figure:
     if found is not None:
         plot_reliability(panels[1], found)
     note = f"{axis_title(report.time_axis)} · {report.judged.episodes} episodes"
-    style.add_legend(figure, _handles(report), note)
+    style.add_legend(figure, trust_handles(report), note)
     return figure
 
 
@@ -46,22 +45,23 @@ def plot_trust(ax: Axes, report: CalibrationReport) -> Axes:
     known.
     """
     found, x = report.calibration, style.positions(report.time_axis, 1.0)
-    for place, colour in zip(x, _grounds(report), strict=True):
-        ax.axvspan(place - 0.5, place + 0.5, color=colour, linewidth=0, zorder=0)
+    style.draw_grounds(ax, x, found.status)
     ax.axhline(0.0, color=style.MUTED, linewidth=0.8)
     if report.ceiling is not None:
         _draw_skill(ax, x, report.ceiling.skill, style.MUTED, linestyle="--")
     _draw_skill(ax, x, found.skill, style.EXPECTED, marker="o", markersize=3.5)
     below = np.flatnonzero(found.skill.value < _LOWEST)
     if below.size:
-        ax.plot(x[below], 0.0 * below + _LOWEST, "v", color=style.EXPECTED, clip_on=False)
+        ax.plot(x[below], 0.0 * below + _LOWEST, "v", color=style.EXPECTED)
         worst = below[found.skill.value[below].argmin()]
         text = f"down to {style.told(float(found.skill.value[worst]), 1)}"
-        style.note(ax, text, (x[worst], _LOWEST), (-6, 4), ha="right", gid=bars.CUT)
+        how = {"ha": "left" if worst < len(x) / 2 else "right", "va": "top", "gid": bars.CUT}
+        style.note(ax, text, (x[worst], _LOWEST), (0, -5), **how)
     for marker, where in zip("ox", _untested(report), strict=True):
         ax.plot(x[where], 0.0 * x[where], marker, color=style.MUTED, mfc="white", markersize=5)
     style.label_steps(ax, report.time_axis, x)
-    ax.set(ylim=(_LOWEST, 1.1), yticks=(-0.5, 0.0, 0.5, 1.0), xlabel="steps ahead")
+    floor = _LOWEST - 0.25 * bool(below.size)
+    ax.set(ylim=(floor, 1.1), yticks=(-0.5, 0.0, 0.5, 1.0), xlabel="steps ahead")
     ax.set_ylabel("skill (1: perfect,\n0: a constant guess)")
     last = report.trust.last_step
     text = "not trusted" if last is None else f"trusted to {step_label(last)}"
@@ -92,14 +92,13 @@ def plot_reliability(ax: Axes, found: Reliability) -> Axes:
     return style.tidy(ax)
 
 
-def _handles(report: CalibrationReport) -> list[Artist]:
-    """Returns what the legend explains: only what is there."""
+def trust_handles(report: CalibrationReport) -> list[Artist]:
+    """Returns what a legend explains of `plot_trust`: only what is there."""
     muted: Any = {"colour": style.MUTED}
     handles: list[Artist] = [bars.handle("this forecast", "-", "o", style.EXPECTED, style.EXPECTED)]
     if report.ceiling is not None:
         handles.append(bars.handle("a perfect forecast", "--", **muted))
-    grounds = _grounds(report)
-    handles += [Patch(color=c, label=text) for c, text in _GROUNDS.items() if c in grounds]
+    handles += style.ground_handles(report.calibration.status)
     constant, unknown = _untested(report)
     handles += [bars.handle("nothing to predict", "", "o", **muted)] * bool(constant.any())
     handles += [bars.handle("not tested", "", "x", **muted)] * bool(unknown.any())
@@ -111,14 +110,6 @@ def _untested(report: CalibrationReport) -> tuple[Any, Any]:
     found = report.calibration
     untested = found.is_("not tested")
     return found.constant & ~untested, untested
-
-
-def _grounds(report: CalibrationReport) -> Any:
-    """Returns `[N+1]`: the colour of the evidence of each component."""
-    found = report.calibration
-    return np.select(
-        [found.is_("good"), found.is_("bad")], [style.TRUSTED, style.WRONG], style.OPEN
-    )
 
 
 def _draw_skill(ax: Axes, x: FloatArray, skill: Any, colour: str, **how: Any) -> None:

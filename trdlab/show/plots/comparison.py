@@ -18,6 +18,7 @@ NAME = "comparison.png"
 _WIDTH = 0.38  # of a bar
 
 
+@style.settings()
 def comparison_figure(comparison: Comparison) -> Figure:
     """Returns the means of both agents with intervals, and below them their difference."""
     names = [f"{side}: {name}" for side, name in zip(SIDES, comparison.names, strict=True)]

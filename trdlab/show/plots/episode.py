@@ -36,6 +36,7 @@ _LINE = 0.19  # inches
 _MAP = 0.75  # of the height that a map has elsewhere
 
 
+@style.settings()
 def story_figure(
     told: Story,
     title: str = "",

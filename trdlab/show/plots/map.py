@@ -34,6 +34,7 @@ _LANES = (-0.12, 0.12)  # of the action's route and of the foil's, beside the mi
 _TALLEST = 3.2  # inches
 
 
+@style.settings()
 def solved_figure(solved: SolvedState) -> Figure:
     """Returns the picture of a solved world: its map, and below it the bars of a state."""
     choice, table, scene = solved.choice, solved.table, scene_of(solved.world, solved.state)
@@ -55,6 +56,7 @@ def solved_figure(solved: SolvedState) -> Figure:
     return figure
 
 
+@style.settings()
 def world_figure(world: Gridworld, state: int = 0) -> Figure:
     """Returns the picture of a gridworld in one of its states."""
     figure = style.new_figure(0.3 + map_height(world), world.grid.title)

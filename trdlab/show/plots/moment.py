@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition
 from trdlab.estimator import Estimator, Future
+from trdlab.explanations.calibration.calibration import Status
 from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.outcome import Trial
-from trdlab.explanations.moment.steps import doubtful
 from trdlab.formatting import decimals_between, decimals_for
 from trdlab.show.plots import bars, style
 from trdlab.show.plots.bars import Scale, plot_components, scale_of, settled
@@ -30,6 +30,7 @@ PANEL = 1.75
 EXPECTED = "expected discounted reward"
 
 
+@style.settings()
 def moment_figure(
     moment: Moment,
     action: str,
@@ -95,24 +96,17 @@ def plot_action(
 ) -> Axes:
     """Draws what is expected of an action, with whiskers (see `whiskers`).
 
-    What is not to be trusted is pale. Where the episode may end meanwhile, a dotted line is the
-    chance that it is still running, with a scale of its own on the right.
+    What has not proved better than a guess stands on red or grey ground. Where the episode may end
+    meanwhile, a dotted line is the chance that it is still running, with a scale on the right.
 
-    Args:
-        ax: the axes to draw on.
-        moment: the decompositions, and their uncertainty or error.
-        action: the name of the action.
-        scale: what the axes show; by default all bars of this action.
-        possible: the values that a component can have; whiskers end there.
-
-    Returns:
-        `ax`.
+    It is drawn on `ax`, which is returned; see `plot_moment`. Without a `scale` the axes show all
+    bars of this action.
     """
     components, ends = moment.components(action), _ends(moment, action, possible)
     scale = scale_of(components[None], ends) if scale is None else scale
     colour = style.action_colours(moment.action_names)[action]
-    faded = doubtful(moment, action)
-    plot_components(ax, components, moment.time_axis, colour=colour, scale=scale, faded=faded)
+    plot_components(ax, components, moment.time_axis, colour=colour, scale=scale)
+    _draw_doubts(ax, moment, [action])
     if ends is not None:
         bars.draw_whiskers(ax, style.positions(moment.time_axis), ends, scale)
     chance = _survival(moment, action)
@@ -126,22 +120,14 @@ def plot_contrast(
 ) -> Axes:
     """Draws action minus foil: up, and in the colour of the action, where that pays more.
 
-    Args:
-        ax: the axes to draw on.
-        moment: the decompositions.
-        action: the name of an action.
-        foil: the name of another.
-        trial: of both; what came of their difference is drawn as diamonds.
-
-    Returns:
-        `ax`.
+    Diamonds are what came of their difference in a trial of both. It is drawn on `ax`, which is
+    returned.
     """
     delta, axis = settled(moment.difference(action, foil)), moment.time_axis
     came = None if trial is None else _came(trial)
     scale, colours = scale_of(delta[None], came), style.action_colours(moment.action_names)
-    faded = doubtful(moment, action) | doubtful(moment, foil)
-    colour = (colours[action], colours[foil])
-    plot_components(ax, delta, axis, colour=colour, scale=scale, faded=faded)
+    plot_components(ax, delta, axis, colour=(colours[action], colours[foil]), scale=scale)
+    _draw_doubts(ax, moment, [action, foil])
     if came is not None:
         bars.draw_whiskers(ax, style.positions(axis) + 0.2, came[1:], scale, came[0])
     return ax
@@ -153,8 +139,7 @@ def explain_marks(
     """Adds a legend of the marks that are there, and says whose future it is."""
     names = [action] if foil is None else [action, foil]
     handles: list[Artist] = [bars.residual_handle()]
-    if any(doubtful(moment, name).any() for name in names):
-        handles.append(bars.faded_handle())
+    handles += style.ground_handles(set(_doubts(moment, names)) - {"good"})
     if meaning := whiskers(moment):
         handles.append(bars.handle(f"whiskers: {meaning}"))
     if any((_survival(moment, name) < 1.0).any() for name in names):
@@ -221,6 +206,20 @@ def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:
     right.spines[["left", "bottom"]].set_visible(False)
     ax.set_zorder(right.get_zorder() + 1)  # the bars stand in front of it
     ax.patch.set_visible(False)
+
+
+def _doubts(moment: Moment, actions: Sequence[str]) -> list[Status]:
+    """Returns N+1: the worst of what was found of actions; all good where nothing was judged."""
+    judged = [moment.status_of(name) for name in actions if moment.trust_of(name) is not None]
+    order: tuple[Status, ...] = ("bad", "not tested", "open", "good")
+    good: list[Status] = ["good"] * moment.time_axis.num_components
+    return [min(found, key=order.index) for found in zip(good, *judged, strict=True)]
+
+
+def _draw_doubts(ax: Axes, moment: Moment, actions: Sequence[str]) -> None:
+    places, doubts = style.positions(moment.time_axis), _doubts(moment, actions)
+    where = np.flatnonzero(np.array(doubts) != "good")
+    style.draw_grounds(ax, places[where], [doubts[i] for i in where])
 
 
 def _lengths(moment: Moment, action: str) -> FloatArray:

@@ -7,8 +7,8 @@ their text can be read on a phone; they need no pyplot, and no backend of the us
 """
 
 import io
-from collections.abc import Collection, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from textwrap import fill
@@ -20,6 +20,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import OutputError
@@ -37,10 +38,14 @@ EXPECTED, COST = "#1d3557", "#b3224a"
 """Rewards and costs that are expected."""
 AGENTS = ("#4b2e83", "#b9a7dc")
 """Two agents that are compared, the dark one first."""
-TRUSTED, WRONG, OPEN = "#dcecd8", "#f8dcdc", "#ececec"
-"""Evidence: proved, disproved, and neither."""
-FADED = 0.3
-"""The opacity of what has not proved to be trustworthy."""
+EVIDENCE = {"good": "#dcecd8", "bad": "#f8d3cf", "open": "#ececec", "not tested": "#ececec"}
+"""The ground that forecasts stand on: proved, disproved, and neither."""
+GROUNDS = {
+    EVIDENCE["good"]: "better than a guess",
+    EVIDENCE["bad"]: "no better than a guess",
+    EVIDENCE["open"]: "open, or not tested",
+}
+"""What a ground means."""
 
 _ACTIONS = (  # those of Okabe and Ito come first, and go to the directions
     *("#0072b2", "#e69f00", "#009e73", "#cc79a7"),
@@ -60,12 +65,7 @@ PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 _DPI = 200
 _GAP = 0.6  # between the explicit components and the residual, in bars
 _MOST_LETTERS = 40  # beneath one axis
-_LOOKS = (  # the user's settings of these would change a picture
-    *("axes", "figure", "font", "hatch", "image", "legend", "lines", "patch", "path", "savefig"),
-    *("scatter", "svg", "text", "xaxis", "xtick", "yaxis", "ytick"),
-)
-_SETTINGS = {
-    **{key: value for key, value in mpl.rcParamsDefault.items() if key.split(".")[0] in _LOOKS},
+_SETTINGS: Any = {
     "font.size": TEXT,
     "text.color": INK,
     "axes.edgecolor": MUTED,
@@ -87,19 +87,22 @@ class Picture(Figure):
         return file.getvalue()
 
 
-def settings() -> AbstractContextManager[None]:
-    """Returns a context in which matplotlib draws as it does for everybody."""
-    return mpl.rc_context(_SETTINGS)
+@contextmanager
+def settings() -> Iterator[None]:
+    """Lets matplotlib draw in the style of trdlab, whatever the user's settings say."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_SETTINGS)
+        yield
 
 
 def new_figure(height: float, title: str = "") -> Picture:
     """Returns an empty picture of a height in inches; what is drawn in it is laid out by itself."""
-    with settings():
-        figure = Picture(figsize=(WIDTH, height), layout="constrained")
-        FigureCanvasAgg(figure)
-        if title:
-            lines = -(-len(title) // 62)
-            figure.suptitle(fill(title, len(title) // lines + 6), fontsize=TITLE)
+    figure = Picture(figsize=(WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    if title:
+        lines = -(-len(title) // 62)
+        figure.suptitle(fill(title, len(title) // lines + 6), fontsize=TITLE)
     return figure
 
 
@@ -190,6 +193,18 @@ def label_steps(ax: Axes, axis: TimeAxis, places: FloatArray) -> None:
     shown.append(axis.horizon)
     ax.set_xticks(places[shown], [axis.labels[i] for i in shown])
     ax.set_xlim(places[0] - 0.6, places[-1] + 0.6)
+
+
+def draw_grounds(ax: Axes, places: FloatArray, status: Sequence[str]) -> None:
+    """Colours the ground of components by the evidence for them."""
+    for place, found in zip(places, status, strict=True):
+        ax.axvspan(place - 0.5, place + 0.5, color=EVIDENCE[found], linewidth=0, zorder=0)
+
+
+def ground_handles(status: Collection[str]) -> list[Patch]:
+    """Returns what a legend explains of grounds: only those that there are."""
+    there = {EVIDENCE[found] for found in status}
+    return [Patch(color=c, label=meaning) for c, meaning in GROUNDS.items() if c in there]
 
 
 def add_legend(figure: Figure, handles: Sequence[Artist], *lines: str) -> None:

@@ -37,6 +37,7 @@ def learning_curves(
     return style.tidy(ax)
 
 
+@style.settings()
 def curves_figure(folders: Sequence[Path]) -> Figure:
     """Returns the picture of the scores of the runs in some folders, of those with metrics.
 

@@ -130,7 +130,8 @@ def test_a_notebook_shows_each_figure_once_and_nothing_else(lesson: Path) -> Non
     for cell in re.split(r"^# %%.*$", lesson.read_text(encoding="utf-8"), flags=re.MULTILINE):
         if "plt.subplots" in cell:
             last = ast.parse(cell).body[-1]
-            assert not isinstance(last, ast.Expr) or "set_yscale" in ast.unparse(last)
+            returns_nothing = ast.unparse(last).startswith(("ax.set_yscale", "add_legend"))
+            assert returns_nothing or not isinstance(last, ast.Expr)
 
 
 def test_first_lesson_shows_the_numbers_of_the_paper() -> None:
@@ -183,7 +184,7 @@ def test_fifth_lesson_learns_from_pixels_what_is_exact() -> None:
 def test_sixth_lesson_names_each_planted_fault_and_no_other() -> None:
     """From five logs: the done-when of the lesson. Dora is the healthy one."""
     printed = printed_by(LESSONS[5])
-    row = r"^ +\d +too-early +discount-off +goes-on-in-next +none$"
+    row = r"^ +\d +mistimed +discount-off +end-ignored +none$"
     assert len(re.findall(row, printed, re.MULTILINE)) == 5
     for name in ("Ada", "Ben", "Cleo"):
         assert f"{name}, repaired: none" in printed
@@ -197,7 +198,7 @@ def test_sixth_lesson_reads_to_a_student_what_is_wrong() -> None:
         )
     }
     assert "It expects rewards 1 step too early." in reports["Ada"]
-    assert "by 0.947, and not by 0.902." in reports["Ben"]
+    assert "by 0.947, and not by 0.90" in reports["Ben"]
     assert "It ignores where episodes end" in reports["Cleo"]
     complaints = ("too early", "too late", "and not by", "ignores", "% of what comes")
     named = {name: [x for x in complaints if x in text] for name, text in reports.items()}

@@ -273,7 +273,7 @@ add_legend(figure, trust_handles(reports["Ada"]))
 # of one step must be γ^w times component i − 1 of the next. For this it needs no rewards at all.
 #
 # - Ada "expects rewards 1 step too early". All her rewards are there, but in the wrong place.
-# - Ben "discounts what comes 2 steps later by" about 0.95, "and not by 0.903", which is γ^w. He
+# - Ben "discounts what comes 2 steps later by" about 0.95, and not by γ^w, which is 0.9025. He
 #   groups two steps, so from one component to the next two steps pass.
 # - Cleo "ignores where episodes end". What she adds there is what the start of the next one
 #   promises, all of it. (It is a little more than all, because in her log flights began anywhere.)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
+from trdlab.explanations.sections import Section
 from trdlab.show.document import Document, document
 from trdlab.show.text import table_cells
 
@@ -37,17 +38,21 @@ def _parts(page: Document) -> Iterator[str]:
         yield _table(table_cells(page.choice))
     if page.grid:
         yield _table(page.grid)
-    for i, sentence in enumerate(page.answer):
-        said = escape(sentence)
-        yield f"<p><strong>{said}</strong></p>" if i == 0 else f"<p>{said}</p>"
-    if page.sections:
-        yield "<details><summary>Details</summary>"
-        for section in page.sections:
-            items = "".join(f"<li>{escape(sentence)}</li>" for sentence in section.sentences)
-            yield f"<h4>{escape(section.heading)}</h4><ul>{items}</ul>"
-        yield "</details>"
+    details = "".join(map(_section, page.sections))
+    if not page.folded:
+        yield details
+    else:
+        for i, sentence in enumerate(page.answer):
+            said = escape(sentence)
+            yield f"<p><strong>{said}</strong></p>" if i == 0 else f"<p>{said}</p>"
+        yield f"<details><summary>Details</summary>{details}</details>" if details else ""
     if page.check is not None:
         yield f'<p class="about">{escape("✓ " * page.check[1] + page.check[0])}</p>'
+
+
+def _section(section: Section) -> str:
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in section.sentences)
+    return f"<h4>{escape(section.heading)}</h4><ul>{items}</ul>"
 
 
 def _table(grid: Sequence[Sequence[str]]) -> str:

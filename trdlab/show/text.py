@@ -144,8 +144,12 @@ def grid_lines(grid: Sequence[Sequence[str]], width: int) -> list[Text]:
         line
         for name, *cells in rows
         for line in (
-            Text(name, style="bold"),
-            *(Text(f"  {of}  {cell}") for of, cell in zip(heading[1:], cells, strict=True)),
+            *wrapped(name, width, "bold"),
+            *(
+                part
+                for of, cell in zip(heading[1:], cells, strict=True)
+                for part in wrapped(f"{of}  {cell}", width, indent=2)
+            ),
         )
     ]
 
@@ -218,9 +222,9 @@ def _stacked(row: _Row, moment: Moment, width: int) -> Iterator[Text]:
     yield from wrapped(f"{row.name}  {row.note}".rstrip(), width, "bold")
     told = [*zip(moment.time_axis.labels, row.components.tolist(), strict=True), ("Q", row.q_value)]
     for label, value in told:
-        yield Text(f"  {label}  {number(value, row.decimals)}", style=row.style)
+        yield from wrapped(f"{label}  {number(value, row.decimals)}", width, row.style, indent=2)
     if moment.totals is not None:
-        yield Text(f"  total  {amount(row.total)}", style=row.style)
+        yield from wrapped(f"total  {amount(row.total)}", width, row.style, indent=2)
 
 
 def _shortened(parts: Sequence[str], shown: int) -> Sequence[str]:

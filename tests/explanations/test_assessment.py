@@ -15,8 +15,10 @@ from trdlab.agents import Agent, gridworld_agent
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments, GymEnvironments
 from trdlab.errors import InputError
-from trdlab.explanations import assess, check, explain, moment_at
+from trdlab.estimator import Future
+from trdlab.explanations import assess, check, explain, moment_at, try_out
 from trdlab.explanations.assessment import judged
+from trdlab.explanations.calibration import claims as calibration
 from trdlab.explanations.calibration.faults import faults
 from trdlab.explanations.moment.moment import CHOICES, Choice
 from trdlab.gridworld import Gridworld, load_map
@@ -158,6 +160,37 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
     report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
     assert (report.ceiling is not None) == (report.foils is not None) == copyable
     assert report.lost == "" if copyable else "Once-v0 cannot be copied: " in report.lost
+
+
+class Tossed(gym.Env):
+    """Pays 0 or 1 at each of twelve steps, by a generator that nobody can copy or seed anew."""
+
+    observation_space, action_space = gym.spaces.Discrete(12), gym.spaces.Discrete(4)
+
+    def reset(self, *, seed=None, options=None):
+        rng = np.random.default_rng(seed)
+        self.at, self.tosses = 0, (rng.integers(2) for _ in range(12))
+        return 0, {}
+
+    def step(self, action):
+        self.at += 1
+        return min(self.at, 11), float(next(self.tosses)), self.at == 12, False, {}
+
+
+def test_copies_that_share_their_chance_do_not_tell_that_all_can_be_known():
+    axis = TimeAxis(0.95, 2, 2)  # of two steps in one no episode tells that each is a toss
+    halves = Given(np.full((12, 4, 3), 0.5), axis, Future("any policy"))
+    agent = trdlab.agent(halves, env=Tossed)
+    report = assess(agent, episodes=40, copying=Copying())
+    assert report.ceiling is not None
+    assert report.ceiling.deterministic
+    assert report.chance
+    said = [claim.sentence for part in calibration.sections(report) for claim in part.claims]
+    assert not any("all that comes can be known" in sentence for sentence in said)
+    assert any("the copies may share their chance" in sentence for sentence in said)
+    tried = try_out(agent, "action 0", "action 1", copies=3).found
+    assert tried.same_every_time
+    assert tried.observed.low[0] < tried.observed.high[0]  # though all six copies went alike
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 _UNIT = float(np.finfo(np.float64).eps)
 _UNDERFLOW = float(np.finfo(np.float64).smallest_subnormal)
+_SINGLE = float(np.finfo(np.float32).eps)
+_INEXACT = 1e-9  # how far a sum of probabilities may be from 1
 SMALL = 300
 """States up to which numpy alone is quicker than importing scipy."""
 
@@ -38,6 +40,8 @@ class MDP:
         terminated: `[K]`, whether the transition ends the episode.
         num_actions: A.
         start: the state in which episodes begin.
+        rounded_rows: the rows that were given in single precision; they are divided by their sum,
+            where that differs from 1 by no more than such numbers do.
 
     Raises:
         InputError: a row is empty or does not sum to 1, a probability is negative, a number is
@@ -51,6 +55,7 @@ class MDP:
     terminated: BoolArray
     num_actions: int
     start: int = 0
+    rounded_rows: int = 0
 
     def __post_init__(self) -> None:
         arrays = (self.next_states, self.probabilities, self.rewards, self.terminated)
@@ -76,8 +81,9 @@ class MDP:
             raise InputError(
                 f"{self._row_name(row)} has a negative probability.", "Check the model."
             )
+        self._divide_rounded_rows()
         sums = np.add.reduceat(self.probabilities, self.offsets[:-1])
-        if np.any(np.abs(sums - 1.0) > 1e-9):
+        if np.any(np.abs(sums - 1.0) > _INEXACT):
             row = int(np.argmax(np.abs(sums - 1.0)))
             raise InputError(
                 f"The probabilities of {self._row_name(row)} sum to {sums[row]:.12g}.",
@@ -87,10 +93,10 @@ class MDP:
             raise InputError(
                 "A transition leads to a state that does not exist.", "Check the model."
             )
-        if not 0 <= self.start < self.num_states:
+        if not isinstance(self.start, int | np.integer) or not 0 <= self.start < self.num_states:
             raise InputError(
-                f"The start state {self.start} does not exist.",
-                f"States run from 0 to {self.num_states - 1}.",
+                f"The start state {self.start!r} does not exist.",
+                f"States are numbers from 0 to {self.num_states - 1}.",
             )
 
     @classmethod
@@ -125,7 +131,7 @@ class MDP:
             next_states=np.array(next_states, dtype=np.int64),
             probabilities=np.array(probabilities, dtype=np.float64),
             rewards=np.array(rewards, dtype=np.float64),
-            terminated=np.array(terminated, dtype=np.bool_),
+            terminated=as_flags(terminated),
             num_actions=len(states[0]),
             start=start,
         )
@@ -232,6 +238,21 @@ class MDP:
         sums = np.add.reduceat(per_transition, self.offsets[:-1])
         return np.asarray(sums.reshape(self.num_states, self.num_actions))
 
+    def _divide_rounded_rows(self) -> None:
+        """Divides rows by their sum that single precision has kept from summing to 1."""
+        sums, lengths = (
+            np.add.reduceat(self.probabilities, self.offsets[:-1]),
+            np.diff(self.offsets),
+        )
+        off = np.abs(sums - 1.0)
+        rounded = (off > _INEXACT) & (off <= (lengths + 1) * _SINGLE)
+        single = self.probabilities == self.probabilities.astype(np.float32)
+        rounded &= np.logical_and.reduceat(single, self.offsets[:-1])
+        if rounded.any():
+            divided = self.probabilities / np.repeat(np.where(rounded, sums, 1.0), lengths)
+            object.__setattr__(self, "probabilities", divided)
+            object.__setattr__(self, "rounded_rows", self.rounded_rows + int(rounded.sum()))
+
     def _row_of(self, transition: int) -> int:
         return int(np.searchsorted(self.offsets, transition, side="right")) - 1
 
@@ -256,6 +277,23 @@ def take_rows(matrix: "csr_array", rows: IntArray) -> "csr_array":
         for part in (matrix.data, matrix.indices)
     )
     return csr_array((data, indices, matrix.indptr[: len(rows) + 1]), (len(rows), matrix.shape[1]))
+
+
+def as_flags(values: Any) -> BoolArray:
+    """Returns true or false for each of `values`, checked.
+
+    Raises:
+        InputError: a value is neither, nor 0 or 1.
+    """
+    flags = np.asarray(values)
+    if flags.dtype == np.bool_:
+        return flags
+    wrong = flags[(flags != 0) & (flags != 1)]
+    if wrong.size:
+        raise InputError(
+            f"Whether a transition terminates is told by {wrong[0]}.", "Give True or False."
+        )
+    return flags.astype(np.bool_)
 
 
 def as_policy(probabilities: Any, shape: tuple[int, ...]) -> FloatArray:

@@ -14,7 +14,7 @@ from trdlab.tabular.mdp import MDP, SMALL, as_policy
 Ties = Literal["lowest", "mixed"]
 
 _UNDERFLOW = float(np.finfo(np.float64).tiny)  # above what underflowing operations lose together
-_LARGEST_VALUE = 1e290  # leaves room for the bounds
+_LARGEST_VALUE = 1e140  # leaves room for variances and bounds
 _GAIN = 1e-12  # relative, below which an action is not changed unless it is proven better
 _SWEEPS, _MOST_SWEEPS = 8, 16_384  # of value iteration between two evaluations
 _MAX_SWEEPS = 2_000
@@ -70,7 +70,7 @@ def optimal(mdp: MDP, gamma: float, *, ties: Ties = "lowest") -> Solution:
     """
     _check(mdp, gamma)
     if ties not in get_args(Ties):
-        raise InputError(f"ties is {ties!r}.", closest(str(ties), get_args(Ties)))
+        raise InputError(f"The ties are {ties!r}.", closest(str(ties), get_args(Ties)))
     best = _surely_improved(mdp, gamma, *_nearly_optimal(mdp, gamma))
     bound = best.solution.error_bound + gamma * mdp.expect(_excess(mdp, gamma, best) - best.error)
     q_values = best.solution.q_values
@@ -329,7 +329,8 @@ def _check(mdp: MDP, gamma: float) -> None:
     largest = float(np.abs(mdp.rewards).max())
     if largest > _LARGEST_VALUE * (1.0 - gamma):
         raise InputError(
-            f"Rewards of {largest:.3g} at gamma = {gamma!r} can add up beyond double precision.",
+            f"Rewards of {largest:.3g} at gamma = {gamma!r} can add up to {_LARGEST_VALUE:.0e} or "
+            "more, whose square is beyond double precision.",
             "Give smaller rewards.",
         )
 

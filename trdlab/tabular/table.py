@@ -8,7 +8,7 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.errors import InputError
+from trdlab.errors import InputError, closest
 from trdlab.estimator import Future
 from trdlab.tabular.mdp import MDP, as_policy
 from trdlab.tabular.series import component_bounds, decompose, step_bounds, steps
@@ -109,7 +109,8 @@ def exact(
         dtype: the precision in which the table is stored; float32 halves its memory.
 
     Raises:
-        InputError: `policy` is no policy of this model, or N is too large for it.
+        InputError: `policy` is no policy of this model, `ties` or `dtype` is unknown, or N is too
+            large for the model.
 
     Source: the paper's Eqs. trd-array and trd-binned-array, and Appendix A.
 
@@ -118,6 +119,10 @@ def exact(
     [[0.0, 1.0, 0.0], [2.0, 0.0, 0.0]]
     """
     gamma = time_axis.gamma
+    if ties not in _TIED_POLICIES:
+        raise InputError(f"The ties are {ties!r}.", closest(str(ties), _TIED_POLICIES))
+    if not np.issubdtype(dtype, np.floating):
+        raise InputError(f"The dtype is {np.dtype(dtype)}.", "Store components as floats.")
     if policy is None:
         solution, whose = optimal(mdp, gamma, ties=ties), _TIED_POLICIES[ties]
     else:

@@ -111,7 +111,7 @@ def of_any_action(comparison: Comparison) -> Iterator[Fields]:
         yield {"distance": float(apart.mean())}
 
 
-@COMPARISONS.rule("They would take the same action at {share:percent} of the states.")
+@COMPARISONS.rule("They would take the same action in {share:percent} of the states.")
 def agreement(comparison: Comparison) -> Iterator[Fields]:
     """Of two who expect the same everywhere that is said only where they act otherwise."""
     one, other = comparison.visits.actions
@@ -124,7 +124,7 @@ def agreement(comparison: Comparison) -> Iterator[Fields]:
 
 
 @COMPARISONS.rule(
-    "The largest difference comes {component:when}: there {more:text} expects {by:number} more "
+    "They differ most in what comes {component:when}: {more:text} expects {by:number} more of it "
     "than {less:text} on average."
 )
 def largest_at(comparison: Comparison) -> Iterator[Fields]:
@@ -138,7 +138,7 @@ def largest_at(comparison: Comparison) -> Iterator[Fields]:
         yield {"component": c, **sides, "by": abs(float(mean[c]))}
 
 
-@COMPARISONS.rule("{share:percent} of their difference lies {components:whens}.")
+@COMPARISONS.rule("{share:percent} of their difference comes {components:whens}.")
 def most_of_it(comparison: Comparison) -> Iterator[Fields]:
     """The fewest components in a row that hold most of the difference; of equals the fullest."""
     size = np.abs(comparison.visits.difference).mean(axis=0)

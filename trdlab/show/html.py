@@ -26,7 +26,6 @@ def _parts(page: Document) -> Iterator[str]:
     yield f"<h3>{escape(page.heading)}</h3>"
     if page.setting:
         yield f'<p class="about">{escape(" · ".join(page.setting))}</p>'
-<<<<<<< HEAD
     if page.scene is not None:
         if page.scene.drawing:
             legend = "\n".join(page.scene.legend)
@@ -34,16 +33,6 @@ def _parts(page: Document) -> Iterator[str]:
         yield from (f'<p class="about">{escape(note)}</p>' for note in page.scene.notes)
     if page.table is not None:
         yield _table(page.table)
-=======
-    if page.drawing:
-        legend = "\n".join(page.legend)
-        yield f"<pre>{escape(page.drawing)}\n\n{escape(legend)}</pre>"
-    yield from (f'<p class="about">{escape(note)}</p>' for note in page.notes)
-    if page.choice is not None and not page.choice.moment.is_over:
-        yield _table(table_cells(page.choice))
-    if page.grid:
-        yield _table(page.grid)
->>>>>>> tests
     details = "".join(map(_section, page.sections))
     if not page.folded:
         yield details
@@ -61,14 +50,8 @@ def _section(section: Section) -> str:
     return f"<h4>{escape(section.heading)}</h4><ul>{items}</ul>"
 
 
-<<<<<<< HEAD
 def _table(table: Table) -> str:
     head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in table.heading)
-=======
-def _table(grid: Sequence[Sequence[str]]) -> str:
-    heading, *rows = grid
-    head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in heading)
->>>>>>> tests
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows
     )

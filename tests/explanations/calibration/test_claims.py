@@ -30,6 +30,7 @@ from trdlab.rollouts.episodes import collect
 from trdlab.show.plots.calibration import plot_trust
 from trdlab.statistics import Estimate, Estimates
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 WORDS = {
     "better": "worse",

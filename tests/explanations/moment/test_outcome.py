@@ -112,8 +112,8 @@ def test_what_came_on_the_ledge_agrees_with_the_exact_values():
 def test_without_chance_it_says_so_and_gives_no_interval():
     trial = try_out(gridworld_agent("drone", AXIS), "down", "up", copies=3)
     assert [claim.sentence for claim in told(trial)] == [
-        "As forecast, down was worth 0.266 more than up; 0.266 was forecast.",
-        "As forecast, down paid 0.95 more than up in 1 step; 0.95 was forecast.",
+        "As forecast, down was worth 0.266 more than up.",
+        "As forecast, down paid 0.95 more than up in 1 step.",
         "Down and up were each tried 3 times from here, and each brought the same every time.",
     ]
 

@@ -93,9 +93,9 @@ def compared(
 ) -> Counterfactual:
     """Returns how two actions differ that were tried.
 
-    Nothing can come that is less, or more, than what was ever seen or is predicted. Where all
-    copies of each brought the same, and not always nothing, there is no chance, unless copies went
-    differently elsewhere.
+    Nothing can come that is less, or more, than what was ever seen, at any step, or is predicted.
+    Where all copies of each brought the same, and not always nothing, there is no chance, unless
+    copies went differently elsewhere.
 
     Args:
         tried: what followed the one and the other.
@@ -105,7 +105,7 @@ def compared(
     whole = all(bool(branches.known[0, -1]) for branches in tried)
     one, other = (_futures(branches, whole) for branches in tried)  # [n, N+2]
     said = np.stack([_with_sum(branches.predicted[0], whole) for branches in tried])  # [2, N+2]
-    everything = np.concatenate([one, other, said, *([] if seen is None else [seen.range])])
+    came = np.concatenate([one, other, *([] if seen is None else [seen.range])])
     same = not any(np.nan_to_num(np.ptp(of, axis=0)).any() for of in (one, other))
     chance = None if seen is None else seen.chance
     if same and (chance is False or (chance is None and np.nan_to_num(one + other).any())):
@@ -113,9 +113,8 @@ def compared(
         observed = Estimates(value, value, value)
     else:
         rng = np.random.default_rng(seed)
-        observed = mean_difference(
-            one, other, everything.min(axis=0), everything.max(axis=0), rng=rng
-        )
+        least, most = _extremes(tried[0].time_axis, came, said)
+        observed = mean_difference(one, other, least, most, rng=rng)
     return Counterfactual(
         time_axis=tried[0].time_axis,
         action=int(tried[0].actions[0]),
@@ -126,6 +125,20 @@ def compared(
         observed=observed,
         same_every_time=same,
     )
+
+
+def _extremes(axis: TimeAxis, came: FloatArray, said: FloatArray) -> FloatArray:
+    """Returns `[2, N+2]`: the least and the most that can come of each component, and in all.
+
+    What was paid at one explicit component could be paid at any, by its own discount.
+    """
+    extremes = np.stack([end([*came, *said], axis=0) for end in (np.min, np.max)])
+    discounts = np.maximum(axis.discounts, np.finfo(np.float64).tiny)  # [N+1]
+    paid = came[:, : axis.horizon] / discounts[:-1]
+    if np.isfinite(paid).any():
+        extremes[0, :-1] = np.minimum(extremes[0, :-1], np.nanmin(paid) * discounts)
+        extremes[1, :-1] = np.maximum(extremes[1, :-1], np.nanmax(paid) * discounts)
+    return extremes
 
 
 def _apart(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -25,6 +25,7 @@ from trdlab.explanations.calibration.residual import Residual
 from trdlab.explanations.calibration.score import Score, score_of
 from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check
 from trdlab.gridworld import Gridworld, load_map
+from trdlab.policies import Memoryless
 from trdlab.rollouts.branches import Branching
 from trdlab.rollouts.episodes import collect
 from trdlab.show.plots.calibration import plot_trust
@@ -238,7 +239,7 @@ def test_the_first_sentences_say_how_it_does_how_far_to_trust_it_and_what_is_wro
     components[..., 8:] = np.random.default_rng(0).normal(size=components[..., 8:].shape)
     worse = replace(table, decomposition=RewardDecomposition(components, axis))
     play = ModelEnvironments(mdp, 40, seed=0, time_limit=60)
-    episodes = collect(worse, play, policy=lambda states: table.solution.policy[states])
+    episodes = collect(worse, play, policy=Memoryless(lambda states: table.solution.policy[states]))
     report = judge(table.future, episodes)
     score, trust, wrong = in_brief(report)
     assert score.sentence == "It scored 3.45 (3.3 to 3.6) an episode, on average over 40 episodes."

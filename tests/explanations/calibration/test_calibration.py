@@ -23,6 +23,7 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
 from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import pool, what_followed
+from trdlab.statistics import unseen
 from trdlab.tabular import ExactTable, exact
 from trdlab.tabular.episodes import ModelEnvironments
 
@@ -268,6 +269,18 @@ def test_rewards_that_never_come_and_are_not_expected_are_no_evidence():
     assert trust(found).last_step is None
     assert trust(found).doubtful.all()
     assert constant(0.0, 1.0).status[:3] == ("bad",) * 3, "a reward that was expected all the time"
+
+
+def test_what_differs_in_few_episodes_is_open_and_it_is_said_how_many_would_tell():
+    axis = TimeAxis(0.5, 1)
+    expected = [[[0.2 + 1e-3 * i, 0.0]] * 2 for i in range(20)]
+    episodes = [episode([float(i < 2)], axis, expected[i]) for i in range(20)]
+    found = calibrate(episodes)
+    assert found.skill.value[0] < 0.0
+    assert found.status[0] == "open"
+    # o² is 0.81 in two episodes and 0.01 in 18: in size like (1.8)² / 1.314 ≈ 2.5, and 10 would do
+    assert found.enough[0] == 90
+    assert found.bias.high[0] - found.bias.value[0] > unseen(20)
 
 
 def test_before_a_reward_that_comes_it_is_right_to_expect_none():

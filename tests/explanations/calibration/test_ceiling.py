@@ -73,6 +73,13 @@ def test_an_exact_table_has_the_skill_of_the_ceiling():
     assert inside(found.skill, exact_ceiling(bridge(), occupancy(bridge()))).mean() >= 0.85
 
 
+def test_what_came_in_few_episodes_speaks_against_no_forecast():
+    table = exact(DRONE.mdp, AXIS)  # which is right, also of what comes in one episode of a hundred
+    for seed in range(40):
+        found = calibrate(collect(table, ModelEnvironments(DRONE.mdp, 50, seed=seed)))
+        assert "bad" not in found.status
+
+
 def test_where_a_coin_decides_the_ceiling_is_zero():
     from trdlab.tabular import MDP
 

@@ -68,7 +68,7 @@ def test_the_story_of_an_episode_as_text_as_json_and_as_a_picture(explain):
 def test_a_calibration_as_text_and_as_json(explain):
     _, out, err = explain("gridworld:ledge", "--what", "calibration", "--N", 3, "--gamma", 0.9)
     assert "γ = 0.9, N = 3, w = 1" in out
-    assert "Its forecasts are better than a guess about what comes at any time." in out
+    assert "Its forecasts are better than a guess about all that comes." in out
     assert err == ""
     code, out, _ = explain("gridworld:ledge", "--what", "calibration", "--json", "--episodes", 50)
     data = json.loads(out)

@@ -16,8 +16,8 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations.calibration.calibration import Calibration, calibrate
 from trdlab.explanations.calibration.errors import errors_of, is_off
+from trdlab.explanations.calibration.report import score_of
 from trdlab.explanations.calibration.residual import residual_of
-from trdlab.explanations.calibration.score import score_of
 from trdlab.explanations.calibration.trust import trust
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless

@@ -20,9 +20,8 @@ from trdlab.explanations.calibration.claims import in_brief, sections, to_dict, 
 from trdlab.explanations.calibration.consistency import Consistency
 from trdlab.explanations.calibration.errors import Errors
 from trdlab.explanations.calibration.faults import REPORTS
-from trdlab.explanations.calibration.report import CalibrationReport, judge
+from trdlab.explanations.calibration.report import CalibrationReport, Score, judge, score_of
 from trdlab.explanations.calibration.residual import Residual
-from trdlab.explanations.calibration.score import Score, score_of
 from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
@@ -242,7 +241,10 @@ def test_the_first_sentences_say_how_it_does_how_far_to_trust_it_and_what_is_wro
     episodes = collect(worse, play, policy=Memoryless(lambda states: table.solution.policy[states]))
     report = judge(table.future, episodes)
     score, trust, wrong = in_brief(report)
-    assert score.sentence == "It scored 3.45 (3.3 to 3.6) an episode, on average over 40 episodes."
+    assert score.sentence == (
+        "It scored 3.45 an episode on average over 40 episodes; the true average is likely 3.3 to "
+        "3.6."
+    )
     assert trust.sentence == (
         "Its forecasts are better than a guess about what comes within 8 steps."
     )

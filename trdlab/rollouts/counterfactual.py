@@ -54,26 +54,9 @@ class Counterfactual:
 
 
 def try_actions(
-    branching: Branching,
-    playing: Playing,
-    action: int,
-    foil: int,
-    *,
-    age: int | None = None,
-    seed: int = 0,
+    branching: Branching, playing: Playing, action: int, foil: int, *, seed: int = 0
 ) -> tuple[Branches, Branches]:
-    """Tries two actions, each from copies of the same state, and follows the policy after them.
-
-    Args:
-        branching: the estimator, and how many copies to make.
-        playing: where the state is: that of the first episode.
-        action: the number of one action.
-        foil: the number of the other.
-        age: the steps since the episode began; by default those that were played.
-        seed: of the copies.
-
-    Returns:
-        What followed the one and the other.
+    """Returns what follows two actions, each tried from copies of where the first episode stands.
 
     Raises:
         InputError: there is no such action, or both are the same.
@@ -82,10 +65,7 @@ def try_actions(
     if action == foil:
         raise InputError(f"Action and foil are both {action}.", "Give two different actions.")
     one, other = np.random.SeedSequence(seed).generate_state(2).tolist()
-    return (
-        branching.at(playing, action, age=age, seed=one),
-        branching.at(playing, foil, age=age, seed=other),
-    )
+    return branching.at(playing, action, seed=one), branching.at(playing, foil, seed=other)
 
 
 def compared(
@@ -105,16 +85,15 @@ def compared(
     whole = all(bool(branches.known[0, -1]) for branches in tried)
     one, other = (_futures(branches, whole) for branches in tried)  # [n, N+2]
     said = np.stack([_with_sum(branches.predicted[0], whole) for branches in tried])  # [2, N+2]
-    came = np.concatenate([one, other, *([] if seen is None else [seen.range])])
     same = not any(np.nan_to_num(np.ptp(of, axis=0)).any() for of in (one, other))
     chance = None if seen is None else seen.chance
     if same and (chance is False or (chance is None and np.nan_to_num(one + other).any())):
         value = one.mean(axis=0) - other.mean(axis=0)
         observed = Estimates(value, value, value)
     else:
-        rng = np.random.default_rng(seed)
-        least, most = _extremes(tried[0].time_axis, came, said)
-        observed = mean_difference(one, other, least, most, rng=rng)
+        came = np.concatenate([one, other, *([] if seen is None else [seen.range])])
+        ends = _extremes(tried[0].time_axis, came, said)
+        observed = mean_difference(one, other, *ends, rng=np.random.default_rng(seed))
     return Counterfactual(
         time_axis=tried[0].time_axis,
         action=int(tried[0].actions[0]),
@@ -127,18 +106,19 @@ def compared(
     )
 
 
-def _extremes(axis: TimeAxis, came: FloatArray, said: FloatArray) -> FloatArray:
-    """Returns `[2, N+2]`: the least and the most that can come of each component, and in all.
+def _extremes(axis: TimeAxis, came: FloatArray, said: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Returns `[N+2]` twice: the least and the most that can come of each component, and in all.
 
     What was paid at one explicit component could be paid at any, by its own discount.
     """
-    extremes = np.stack([end([*came, *said], axis=0) for end in (np.min, np.max)])
+    rows = np.concatenate([came, said])
+    least, most = rows.min(axis=0), rows.max(axis=0)
     discounts = np.maximum(axis.discounts, np.finfo(np.float64).tiny)  # [N+1]
     paid = came[:, : axis.horizon] / discounts[:-1]
     if np.isfinite(paid).any():
-        extremes[0, :-1] = np.minimum(extremes[0, :-1], np.nanmin(paid) * discounts)
-        extremes[1, :-1] = np.maximum(extremes[1, :-1], np.nanmax(paid) * discounts)
-    return extremes
+        least[:-1] = np.minimum(least[:-1], np.nanmin(paid) * discounts)
+        most[:-1] = np.maximum(most[:-1], np.nanmax(paid) * discounts)
+    return least, most
 
 
 def _apart(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -393,4 +393,4 @@ def test_the_horizon_that_suffices_is_read_off_the_rewards():
     tails = exact_tails(table, occupancy(table), 60)
     assert found.observed_tails[:15] == pytest.approx(tails[:15], abs=0.03)
     least = int(np.flatnonzero(tails <= 0.05)[0])
-    assert found.sufficient() in (least - 1, least, least + 1)
+    assert found.sufficient in (least - 1, least, least + 1)

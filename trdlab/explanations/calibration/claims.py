@@ -218,7 +218,7 @@ def later(report: CalibrationReport) -> Found:
     "With N = {horizon:count}, at most {share:percent} of the rewards that came would be later."
 )
 def would_suffice(report: CalibrationReport) -> Iterator[Fields]:
-    least = report.residual.sufficient()
+    least = report.residual.sufficient
     if least is not None and least > report.time_axis.horizon:
         yield {"horizon": least, "share": SHARE}
 

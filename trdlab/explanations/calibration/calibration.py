@@ -16,6 +16,7 @@ from trdlab.statistics import (
     Estimates,
     by_episode,
     different_episodes,
+    effective,
     enough,
     unseen,
 )
@@ -99,27 +100,29 @@ def calibrate(episodes: Sequence[Episode] | Samples, *, seed: int = 0) -> Calibr
     mean = np.where(seen, observed.sum(axis=0) / np.maximum(num_samples, 1), np.nan)
     o = np.where(known, observed - mean, 0.0)  # so that squares do not swallow what is small
     e = np.where(known, samples.predicted - observed, 0.0)
-    varies = np.abs(o).max(axis=0) > _ROUNDING * np.abs(observed).max(axis=0)
-    constant = seen & ~varies
     parts = (known.astype(np.float64), e, e * e, o, o * o)
     sums = np.stack([samples.per_episode(part) for part in parts], axis=1)  # [E, 5, N+1]
+    varies = np.abs(o).max(axis=0) > _ROUNDING * np.abs(observed).max(axis=0)
+    constant = seen & ~varies
+
     num_episodes = different_episodes(sums, sums[:, 0] > 0)
-    telling = np.minimum(num_episodes, _effective(sums[:, 4]) * varies)
+    telling = np.minimum(num_episodes, effective(sums[:, 4]) * varies)
     rare = telling < FEWEST_EPISODES
     ranges = [_range(of) for of in (samples.predicted, observed)]
     missed = _could_be_missed(axis, num_episodes, ranges)
-    shown = np.stack([seen, seen, varies])
-    found = by_episode(sums, _statistics, seed=seed)  # [3, N+1]
+
+    shown = np.stack([seen, seen, varies, seen])
+    found = by_episode(sums, _statistics, seed=seed)  # [4, N+1]
     found = found.where(shown, shown & (num_episodes >= FEWEST_EPISODES))
-    wider = np.stack([missed * rare, 0.0 * missed, 0.0 * missed])
+    wider = np.eye(4)[0][:, None] * np.where(rare, missed, 0.0)  # of the bias alone
     ends = zip(found.value, found.low - wider, found.high + wider, strict=True)
-    bias, error, skill = (Estimates(*of) for of in ends)
-    variance = _variance(*sums[:, [0, 3, 4]].sum(axis=0))
-    right = error.value <= _allowed(axis, mean, np.where(varies, variance, np.nan))
+    bias, error, skill, variance = (Estimates(*of) for of in ends)
+
+    right = error.value <= _allowed(axis, mean, np.where(varies, variance.value, np.nan))
     wrong = np.abs(bias.value) > missed
-    is_good = np.where(constant, right, skill.low > 0.0)
-    is_bad = wrong & constant | (skill.high <= 0.0) & (wrong | ~rare)
     untested = ~seen | (constant & ~_pays(mean) & ~wrong)
+    is_good = np.where(constant, right, skill.low > 0.0)
+    is_bad = (constant & wrong) | ((skill.high <= 0.0) & (wrong | ~rare))
     status = np.select([untested, is_good, is_bad], ["not tested", "good", "bad"], "open")
     return Calibration(
         time_axis=axis,
@@ -134,7 +137,7 @@ def calibrate(episodes: Sequence[Episode] | Samples, *, seed: int = 0) -> Calibr
         bias=bias,
         error=error,
         mean=mean,
-        variance=variance,
+        variance=variance.value,
         skill=skill,
         predicted_range=ranges[0],
         observed_range=ranges[1],
@@ -143,28 +146,15 @@ def calibrate(episodes: Sequence[Episode] | Samples, *, seed: int = 0) -> Calibr
 
 
 def _statistics(sums: FloatArray) -> FloatArray:
-    """Returns `[R, 3, N+1]`: bias, error and skill of pooled sums `[R, 5, N+1]`.
+    """Returns `[R, 4, N+1]`: bias, error, skill and variance of pooled sums `[R, 5, N+1]`.
 
     The sums are of 1, e = predicted − observed, e², o and o², with o counted from the mean of what
     was observed. Where a sample has no variance, its skill is −∞ if there was an error and does not
     exist if there was none.
     """
     n, e, ee, o, oo = np.moveaxis(sums, 1, 0)
-    return np.stack([e / n, ee / n, 1.0 - (ee / n) / _variance(n, o, oo)], axis=1)
-
-
-def _variance(count: FloatArray, total: FloatArray, squares: FloatArray) -> FloatArray:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.maximum(squares / count - (total / count) ** 2, 0.0))
-
-
-def _effective(shares: FloatArray) -> FloatArray:
-    """Returns `[N+1]`: from how many of E episodes a sum is, if `shares [E, N+1]` differ in size.
-
-    Source: Kish (1965), "Survey sampling", on the effective size of a weighted sample.
-    """
-    total = shares.sum(axis=0)
-    return np.asarray(total**2 / np.maximum((shares**2).sum(axis=0), np.finfo(np.float64).tiny))
+    variance = np.maximum(oo / n - (o / n) ** 2, 0.0)
+    return np.stack([e / n, ee / n, 1.0 - (ee / n) / variance, variance], axis=1)
 
 
 def _pays(mean: FloatArray) -> BoolArray:

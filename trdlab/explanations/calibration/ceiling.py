@@ -18,14 +18,12 @@ class Ceiling:
     Args:
         skill: `[N+1]`; NaN where it is not known, or where nothing varies.
         num_moments: how many moments were continued from copies.
-        copies: n, how often each was.
         deterministic: whether different things followed different moments, and the same followed
             all copies of each: then the ceiling is 1, if chance is not shared by copies.
     """
 
     skill: Estimates
     num_moments: int
-    copies: int
     deterministic: bool
 
 
@@ -70,7 +68,6 @@ def ceiling_of(branches: Branches, *, seed: int = 0) -> Ceiling:
     return Ceiling(
         skill=by_episode(sums, skill, seed=seed),
         num_moments=moments,
-        copies=n,
         # a variance may have rounding errors
         deterministic=bool(np.ptp(observed, axis=0).any() and not np.ptp(observed, axis=1).any()),
     )

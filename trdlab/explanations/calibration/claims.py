@@ -5,7 +5,7 @@ from itertools import groupby
 from typing import Any
 
 from trdlab.explanations.calibration import faults
-from trdlab.explanations.calibration.calibration import Calibration
+from trdlab.explanations.calibration.calibration import Calibration, Status
 from trdlab.explanations.calibration.faults import REPORTS
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.calibration.residual import SHARE
@@ -32,7 +32,9 @@ Found = Iterator[tuple[str, Fields]]
 
 @REPORTS.kinds(
     {
-        "scored-once": "It scored {returns:number} in its one episode, which is the same every time.",
+        "scored-once": (
+            "It scored {returns:number} in its one episode, which is the same every time."
+        ),
         "scored-always": "It scored {returns:number} in each of {episodes:episodes}.",
         "scored-few": "It scored {returns:number} an episode on average over {episodes:episodes}.",
         "scored": (
@@ -116,15 +118,18 @@ def _verdicts(whose: str, told: Calibration, unseen: str) -> Found:
 
 
 def _kind(told: Calibration, i: int) -> str:
-    status, constant = told.status[i], bool(told.constant[i])
-    if status == "good":
-        return "right" if constant else "better"
-    if status == "bad":
-        return "wrong" if constant else "no-better"
-    if status == "not tested":
-        return "silent" if constant else "unseen"
-    few = told.num_episodes[i] < FEWEST_EPISODES and not constant
-    return "too-few" if few else "unsure"
+    same, changing = _KINDS[told.status[i]]
+    few = told.status[i] == "open" and told.num_episodes[i] < FEWEST_EPISODES
+    return same if told.constant[i] else "too-few" if few else changing
+
+
+_KINDS: dict[Status, tuple[str, str]] = {
+    "good": ("right", "better"),
+    "bad": ("wrong", "no-better"),
+    "open": ("unsure", "unsure"),
+    "not tested": ("silent", "unseen"),
+}
+"""Of each status what is said, where the reward was the same every time and where it was not."""
 
 
 def verdicts(report: CalibrationReport, whose: str = OWN) -> list[Claim]:
@@ -187,7 +192,7 @@ def limits(report: CalibrationReport) -> Found:
 
 
 def _known(report: CalibrationReport) -> list[Claim]:
-    """Returns what can be known: of all, or of the first component that is not good, or the last."""
+    """Returns what can be known: of all, or of the first component not good, or the last."""
     at = min(report.trust.components, report.time_axis.horizon - 1)
     return [of for of in every(report, *limits) if of.fields.get("component", at) == at][:1]
 

@@ -62,10 +62,6 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
     b = c = 0. Means are compared, because where there is chance a step fits the next on average
     only; over steps of about the same age, because the age is known before anything happens.
 
-    Args:
-        episodes: what was predicted and what happened; all of one time axis.
-        seed: of the bootstrap, which is by episode.
-
     Raises:
         InputError: there are no episodes, or of different time axes; there are no components to
             compare (N = 0), or no two steps w apart.

@@ -31,7 +31,6 @@ class Errors:
     Args:
         shift: by how many components rewards are predicted too late; negative if too early. It is
             0 unless another one is the best in nearly all bootstrap samples.
-        agreement: the share of bootstrap samples in which the best shift is the best.
         amount: how many times as much is predicted as comes, of all explicit components together.
             NaN where nothing came.
         smear: x, where p + x·(2p − p₋ − p₊) is the best prediction that can be had from p and its
@@ -41,7 +40,6 @@ class Errors:
     """
 
     shift: int
-    agreement: float
     amount: Estimate
     smear: Estimate
 
@@ -53,10 +51,6 @@ def is_off(amount: Estimate) -> bool:
 
 def errors_of(samples: Samples, *, seed: int = 0) -> Errors:
     """Returns what is wrong with the timing, the amount and the sharpness of a forecast.
-
-    Args:
-        samples: predictions and what followed them.
-        seed: of the bootstrap, which is by episode.
 
     Raises:
         InputError: there are fewer than 2 explicit components, or their discounts vanish.
@@ -81,7 +75,7 @@ def errors_of(samples: Samples, *, seed: int = 0) -> Errors:
     bend[:, 1:-1] = 2.0 * scaled[:, 1:-1] - scaled[:, :-2] - scaled[:, 2:]
     bend = np.where(known, bend, 0.0)
     over, under = (np.einsum("mk,mk->m", bend, of) for of in (o - scaled, bend))
-    return Errors(shift, agreement, amount, smear=_ratio(samples, over, under, seed))
+    return Errors(shift, amount, smear=_ratio(samples, over, under, seed))
 
 
 def _best_shift(samples: Samples, p: FloatArray, o: FloatArray, seed: int) -> tuple[int, float]:

@@ -45,10 +45,6 @@ class Residual:
 def residual_of(episodes: Sequence[Episode], *, seed: int = 0) -> Residual:
     """Returns how much of values, and of the differences between actions, is in the residual.
 
-    Args:
-        episodes: what was predicted and what happened; all of one time axis.
-        seed: of the bootstrap, which is by episode.
-
     Raises:
         InputError: there are no episodes, or they are of different time axes.
     """

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types imports unit docs bench clean
+.PHONY: demo test test-lowest lint types imports unit docs bench clean
 
 demo: $(VENV)/installed
 	$(BIN)/trdlab gridworld --gamma 0.95 --N 2 --w 2
@@ -25,13 +25,23 @@ unit: $(VENV)/installed-tests
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2  # one thread for each worker
 
 docs: $(VENV)/installed-tests
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo 'Open site/index.html in a browser.'
+
+# With the lowest versions that we declare, and then with the lowest Gymnasium that has Atari games.
+# They have wheels for Python 3.11 and 3.12.
+test-lowest: $(VENV)-lowest/installed
+	$(LOWEST_PIP) gymnasium==1.0.0
+	$(LOWEST_TESTS) -k "not atari" tests/gridworld tests/environments tests/rollouts/test_evaluation.py tests/cli/test_gridworld.py \
+		tests/cli/test_train.py tests/deep/test_estimator.py tests/deep/test_networks.py tests/training/test_setup.py
+	$(LOWEST_PIP) gymnasium==1.1.0
+	$(LOWEST_TESTS) tests/atari tests/test_wrappers.py
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/startup.py
 
 clean:
-	rm -rf $(VENV) site
+	rm -rf $(VENV) $(VENV)-lowest .cache site
 
 $(VENV)/python: constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "trdlab needs Python 3.11 or newer; try: make PYTHON=python3.12 $(MAKECMDGOALS)")'
@@ -44,4 +54,13 @@ $(VENV)/installed: $(VENV)/python pyproject.toml
 
 $(VENV)/installed-tests: $(VENV)/installed
 	$(PIP) -e '.[test,docs]'
+	touch $@
+
+LOWEST_PIP := $(VENV)-lowest/bin/python -m pip install --quiet --disable-pip-version-check
+LOWEST_TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(VENV)-lowest/bin/pytest -q -n 2 -W default --disable-warnings
+
+$(VENV)-lowest/installed: constraints.txt pyproject.toml .ci/lowest.py
+	$(PYTHON) -m venv $(VENV)-lowest
+	$(PYTHON) .ci/lowest.py > $(VENV)-lowest/constraints.txt
+	$(LOWEST_PIP) -c $(VENV)-lowest/constraints.txt -e . pytest pytest-xdist hypothesis
 	touch $@

@@ -22,7 +22,8 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.pixels import pictures
 from trdlab.tabular import operator_table
 from trdlab.tabular.reach import reachable
-from trdlab.training.setup import future, make_environments, new_trainer, resolved
+from trdlab.training.machine import resolved
+from trdlab.training.setup import future, make_environments, new_trainer
 
 GAMMA, HORIZON, ENVIRONMENTS = 0.9, 4, 8
 

@@ -46,7 +46,7 @@ def ours(
     """Returns one whole update: sampling, the update, its metrics."""
     space = gym.spaces.Box(0, 255, SHAPE, np.uint8)
     network = build_network(space, num_actions, TimeAxis(0.99, horizon))
-    learner = Learner(network, UpdateSettings(bf16=bf16))
+    learner = Learner(network, UpdateSettings(precision="bfloat16" if bf16 else "float32"))
     return lambda: learner.update(sample())
 
 

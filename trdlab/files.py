@@ -11,7 +11,7 @@ from shutil import rmtree
 from stat import S_ISREG
 from typing import Any
 
-from trdlab.errors import OutputError, TrdlabError, closest
+from trdlab.errors import InputError, OutputError, TrdlabError, closest
 
 _LEFTOVER = ".trdlab-"
 
@@ -46,6 +46,18 @@ def check_output(path: Path, suffixes: Collection[str], *, overwrite: bool = Fal
         raise OutputError(f"The file '{path}' exists.", "Choose another name, or `overwrite=True`.")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"The folder '{folder}' is not writable.", "Choose another one.")
+
+
+def check_small_text(path: Path) -> None:
+    """Checks that a file can be a text written by hand, before all of it is read.
+
+    Raises:
+        InputError: it is a device, such as `/dev/zero`, or larger than a megabyte.
+    """
+    if path.is_char_device() or path.is_block_device():
+        raise InputError(f"'{path}' is a device.", "Name a text file.")
+    if path.is_file() and (size := path.stat().st_size) > 1_000_000:
+        raise InputError(f"'{path}' has {size:,} bytes.", "Name a text file, below a megabyte.")
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:

@@ -1,6 +1,6 @@
 """Gymnasium wrappers that put the decomposition of every action into `info`."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -13,6 +13,11 @@ from trdlab.arrays import BoolArray, FloatArray
 from trdlab.environments.answers import layers
 from trdlab.errors import InputError, TrdlabError
 from trdlab.estimator import Estimator
+
+if TYPE_CHECKING:
+    _VectorWrapper = VectorWrapper[Any, Any, Any, Any, Any]
+else:  # which is generic from Gymnasium 1.4 on
+    _VectorWrapper = VectorWrapper
 
 ALL_ACTIONS = "reward_decomposition"
 CHOSEN = "chosen_decomposition"
@@ -79,7 +84,7 @@ class TemporalRewardDecomposition(gym.Wrapper[Any, Any, Any, Any], RecordConstru
         return self._components.copy()
 
 
-class VectorTemporalRewardDecomposition(VectorWrapper[Any, Any, Any, Any, Any]):
+class VectorTemporalRewardDecomposition(_VectorWrapper):
     """Looks up, at each batch of observations, what each action is expected to earn and when.
 
     `info["reward_decomposition"]` is `[num_envs, A, N+1]` and `info["chosen_decomposition"]`, after

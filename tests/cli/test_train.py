@@ -21,6 +21,7 @@ import pytest
 import torch
 from rich.console import Console
 
+from trdlab.agents.runs import run_agent
 from trdlab.cli import main
 from trdlab.cli.options import flag
 from trdlab.cli.progress import EpisodeProgress, TrainingProgress, stopping
@@ -100,7 +101,8 @@ def test_the_help_has_every_setting_under_its_heading(trdlab, kind):
         assert f"{name}: {about}" in told
         assert all(key in keys for key in lines)
     horizon = preset(kind, "X").horizon
-    assert f"--N <int> Number of explicit components; 0 is DQN. [default: ({horizon})]" in told
+    about = rf"Number of explicit components; 0 is DQN\. \[default: \({horizon}\)\]"
+    assert re.search(rf"--N (<int>|INTEGER) {about}", told)  # which of them, Typer decides
 
 
 @pytest.mark.parametrize("command", ["resume", "evaluate", "runs"])
@@ -182,19 +184,22 @@ def test_options_of_every_type_and_which_of_preset_file_and_option_wins(trdlab, 
         (["atari", "Brekout"], "no Atari game 'Brekout'. Did you mean 'Breakout'?"),
         (
             ["atari", "Pong", "--env-arg", "stiky=0.1"],
-            "no argument 'stiky'. Did you mean 'sticky'?",
+            "Atari games take no argument 'stiky'. Did you mean 'sticky'?",
         ),
         (["gym", "CartPole-v1", "--env-arg", "gravity"], "'gravity' is not KEY=VALUE."),
         (["gym", "CartPole-v1", "--preset", "clasic"], "Did you mean 'classic'?"),
         (["gym", "CartPole-v1", "--preset", "paper"], "no preset 'paper' for gym. Known: classic"),
         (["gym", "CartPole-v1", "--config", "none.toml"], "'none.toml' cannot be read"),
-        (["gym", "CartPole-v1", "--learning-rat", "1"], "No such option: --learning-rat (Possible"),
+        (["gym", "CartPole-v1", "--learning-rat", "1"], "No such option"),
         (["gym", "CartPole-v1", "--N", "2.5"], "Invalid value for '--N'"),
-        (["gym", "CartPole-v1", "--N", "-1"], "The horizon N is -1. It must be"),
+        (["gym", "CartPole-v1", "--N", "-1"], "--N is -1. It must be from 0 to 10,000."),
         (["gym", "CartPole-v1", "--gamma", "1"], "gamma is 1.0. It must be at least 0"),
         (["gym", "CartPole-v1", "--hidden", "64,x"], "--hidden is '64,x': give sizes, such as"),
-        (["gym", "CartPole-v1", "--hidden", "0"], "--hidden is (0,). It must be sizes above 0."),
-        (["gym", "CartPole-v1", "--epsilon-end", "2"], "--epsilon-end is 2.0. It must be from 0"),
+        (["gym", "CartPole-v1", "--hidden", "0"], "--hidden is 0. It must be from 1 to"),
+        (
+            ["gym", "CartPole-v1", "--epsilon-end", "2"],
+            "--epsilon-end is 2.0. It must be from 0",
+        ),
         (["gym", "CartPole-v1", "--seed", str(2**64)], "It must be less than 2**63."),
         (
             ["gym", "CartPole-v1", "--num-envs", "1", "--learning-starts", "3", "--w", "4"],
@@ -211,6 +216,63 @@ def test_what_cannot_be_used_is_refused_in_one_line(trdlab, tmp_path, monkeypatc
         assert message in err
         assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["--N", 10**24], 2, "--N is 1000000000000000000000000. It must be from 0 to"),
+        (["--N", 10**6], 2, "--N is 1000000."),
+        (["--batch-size", 10**22], 2, "--batch-size is 1"),
+        (["--batch-size", 10**8], 2, "A batch of 100000000 windows is larger than a replay memory"),
+        (["--batch-size", 10**8, "--capacity", 10**8], 1, "Learning with this network and batch"),
+        (
+            ["--hidden", "1000000,1000000"],
+            1,
+            "Learning with this network and batch takes about 200",
+        ),
+        (["--hidden", 10**13], 2, "--hidden is 10000000000000."),
+        (["--threads", 10**5], 2, "--threads is 100000, and the machine has"),
+        (["--threads", 10**30], 2, "It must be less than 2**63."),
+        (["--num-envs", 10**9], 2, "--num-envs is 1000000000."),
+        (["--capacity", 10**17], 1, "A replay memory of 100000000000000000 transitions takes"),
+        (["--w", 10**15, "--learning-starts", 10**15], 2, "Choose 8000000000000000 or more."),
+        (["--agent-steps", 10**30], 2, "It must be less than 2**63."),
+        (["--agent-steps", -5], 2, "--agent-steps is -5."),
+        (["--evaluate-episodes", 10**12], 2, "It must be from 0 to 100,000."),
+        (["--gamma", "nan"], 2, "gamma is nan."),
+        (["--gamma", "-inf"], 2, "gamma is -inf."),
+        (
+            ["--epsilon-start", "nan"],
+            2,
+            "--epsilon-start is nan. It must be from 0 to 1.",
+        ),
+        (["--epsilon-end", "-0.1"], 2, "--epsilon-end is -0.1."),
+        (["--evaluate-epsilon", "inf"], 2, "--evaluate-epsilon is inf."),
+        (["--learning-rate", "nan"], 2, "The learning rate is nan."),
+        (["--learning-rate", "inf"], 2, "The learning rate is inf."),
+        (["--learning-rate-end", "nan"], 2, "--learning-rate-end is nan."),
+        (["--device", "cpu:x"], 2, "PyTorch finds no device 'cpu:x' here."),
+        (["--config", "/dev/zero"], 2, "'/dev/zero' is a device. Name a text file."),
+    ],
+)
+def test_what_cannot_fit_or_be_meant_is_refused_before_work_begins(
+    trdlab, tmp_path, monkeypatch, words, code, message
+):
+    monkeypatch.chdir(tmp_path)
+    for more in ([], ["--dry-run"]):
+        refused, out, err = trdlab("train", "gym", "CartPole-v1", *words, *more)
+        assert (refused, out, err.count("\n")) == (code, "", 1)
+        assert err.startswith("error: ")
+        assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_settings_of_a_file_and_of_the_command_are_checked_together(trdlab, tmp_path):
+    file = tmp_path / "run.toml"
+    file.write_text("w = 20\nlearning_starts = 30")  # too few for the environments of the preset
+    words = ("--config", file, "--num-envs", 1, "--dry-run")
+    assert planned(trdlab("train", "gym", "CartPole-v1", *words))["learning_starts"] == 30
 
 
 @pytest.mark.parametrize(
@@ -256,6 +318,24 @@ def test_a_run_from_start_to_score(trdlab, tmp_path, monkeypatch):
     assert list(Path("runs/CartPole-v1-N2-w1-seed1-2/evaluations").iterdir()) == []
 
 
+def test_actions_are_called_as_people_say(trdlab, tmp_path):
+    words = ("train", "gym", "CartPole-v1", *SMALL, "--evaluate-episodes", 0, "--out")
+    assert trdlab(*words, tmp_path / "run", "--action-names", "push left, push right")[0] == 0
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    assert manifest["environment"]["action_names"] == ["push left", "push right"]
+    assert run_agent(tmp_path / "run").action_names == ("push left", "push right")
+    assert trdlab("resume", tmp_path / "run")[0] == 0
+    for names, message in (
+        ("left,right,up", "There are 3 names for 2 actions: left, right, up. Give one for each"),
+        ("left,left", "The action names are 'left', 'left'. Each has a name of its own."),
+    ):
+        for more in ([], ["--dry-run"]):
+            code, _, err = trdlab(*words, tmp_path / "no", "--action-names", names, *more)
+            assert (code, err.count("\n")) == (2, 1)
+            assert message in err
+    assert not (tmp_path / "no").exists()
+
+
 def test_an_evaluation_as_json(trdlab, trained):
     code, out, err = trdlab("evaluate", trained, "--episodes", 2, "--seed", 3, "--json")
     assert code == 0
@@ -271,6 +351,9 @@ def test_an_evaluation_as_json(trdlab, trained):
     code, _, err = trdlab("evaluate", trained, "--epsilon", 2)
     assert code == 2
     assert "Invalid value for '--epsilon'" in err
+    code, _, err = trdlab("evaluate", trained, "--epsilon", "nan")
+    message = "error: --epsilon is nan. It lies from 0 to 1.\n"
+    assert (code, err) == (2, message)
 
 
 def test_an_evaluation_that_would_never_return_is_cut_off(trdlab, tmp_path):
@@ -382,6 +465,15 @@ def test_pipes_get_plain_text(trained, tmp_path):
     assert done.stdout.startswith(b"3 episodes, greedy")
     assert b"1 of 120 steps" in done.stderr
     assert b"1 of 120 steps" not in done.stdout
+
+
+@pytest.mark.parametrize("words", [["runs", ".", "--plot"], ["gridworld", "--plot"]])
+def test_pictures_need_no_backend_of_a_notebook(tmp_path, trained, words, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(trained, tmp_path / "pole")
+    done = in_shell(*words, "picture.png", MPLBACKEND="module://matplotlib_inline.backend_inline")
+    assert done.returncode == 0, done.stderr.decode()
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
 
 
 # ---- progress and signals ------------------------------------------------------------------------

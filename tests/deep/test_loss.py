@@ -79,30 +79,62 @@ def test_loops_in_plain_python_agree(batch, num_actions, horizon, double, seed):
     assert mean == pytest.approx(total / batch / (horizon + 1))
 
 
-def test_without_explicit_components_it_is_dqn():
+def twice_smooth_l1(value: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+    return 2 * nn.functional.smooth_l1_loss(value, target)
+
+
+@pytest.mark.parametrize(
+    ("loss_name", "scalar"), [("squared", nn.functional.mse_loss), ("huber", twice_smooth_l1)]
+)
+def test_without_explicit_components_it_is_dqn(loss_name, scalar):
     """Loss and gradients of a network with N = 0 are those of a scalar DQN, written by hand."""
     torch.manual_seed(0)
     ours, target_network = nn.Linear(5, 3), nn.Linear(5, 3)
     theirs = nn.Linear(5, 3)
     theirs.load_state_dict(ours.state_dict())
-    observations, following, rewards = torch.randn(8, 5), torch.randn(8, 5), torch.randn(8)
+    observations, following, rewards = torch.randn(8, 5), torch.randn(8, 5), 3 * torch.randn(8)
     actions, terminated = torch.randint(0, 3, (8,)), torch.rand(8) < 0.3
 
     discount = 0.99 * (1 - terminated.float())
     target = trd_target(rewards, discount, target_network(following)[..., None])
-    loss = td_loss(ours(observations)[..., None], actions, target)
+    loss = td_loss(ours(observations)[..., None], actions, target, loss=loss_name)
     loss.backward()
 
     with torch.no_grad():
         next_value = target_network(following).max(1).values
         scalar_target = rewards + 0.99 * (1 - terminated.float()) * next_value
     value = theirs(observations).gather(1, actions[:, None]).squeeze(1)
-    scalar_loss = nn.functional.mse_loss(value, scalar_target)
+    scalar_loss = scalar(value, scalar_target)
+    assert ((value - scalar_target).abs() > 1).any()
+    assert ((value - scalar_target).abs() < 1).any()
     scalar_loss.backward()
 
     assert loss.item() == pytest.approx(scalar_loss.item(), abs=1e-6)
     for mine, other in zip(ours.parameters(), theirs.parameters(), strict=True):
         torch.testing.assert_close(mine.grad, other.grad, atol=1e-6, rtol=0)
+
+
+@pytest.mark.parametrize("reduction", ["sum", "mean"])
+def test_huber_minds_the_length_of_the_errors_and_not_each_of_them(reduction):
+    """A reward of 12 comes at one of four steps, each as likely: it is 3 on average at each.
+
+    The median of each component is 0, and Huber's error of each would be least at 1/3.
+    """
+    components, rewards = torch.zeros(1, 1, 4, requires_grad=True), 12 * torch.eye(4)
+    optimiser = torch.optim.SGD([components], lr=0.3)
+    for _ in range(1000):
+        optimiser.zero_grad()
+        everyone = components.expand(4, 1, 4)
+        loss = td_loss(everyone, torch.zeros(4, dtype=torch.int64), rewards, reduction, "huber")
+        loss.backward()
+        optimiser.step()
+    torch.testing.assert_close(components.detach()[0, 0], torch.full((4,), 3.0), atol=1e-3, rtol=0)
+
+
+def test_huber_without_an_error_has_no_gradient():
+    components = torch.zeros(1, 1, 3, requires_grad=True)
+    td_loss(components, torch.tensor([0]), torch.zeros(1, 3), loss="huber").backward()
+    assert components.grad.tolist() == [[[0.0, 0.0, 0.0]]]
 
 
 def test_no_gradient_flows_into_the_target():
@@ -149,6 +181,8 @@ def test_shapes_that_do_not_fit_are_named():
         trd_target(REWARD[:, None], DISCOUNT, components)
     with pytest.raises(InputError, match=r"'median'.*'sum' or 'mean'"):
         td_loss(components, actions, torch.zeros(2, 4), "median")
+    with pytest.raises(InputError, match=r"'l1'.*'squared' or 'huber'"):
+        td_loss(components, actions, torch.zeros(2, 4), loss="l1")
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

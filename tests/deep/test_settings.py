@@ -27,6 +27,9 @@ GYM = TrainSettings("gym", "CartPole-v1")
             "learning_starts": st.integers(10, 1000),
             "learning_rate_end": st.floats(0, 1),
             "reduction": st.sampled_from(["sum", "mean"]),
+            "loss": st.sampled_from(["squared", "huber"]),
+            "max_grad_norm": st.floats(0.1, 10),
+            "action_names": st.lists(st.sampled_from("abc"), max_size=3, unique=True),
             "double": st.booleans(),
             "hidden": st.lists(st.integers(1, 512), max_size=3),
             "weights": st.text(),
@@ -46,6 +49,7 @@ def test_what_is_not_said_has_the_default_and_what_is_not_set_is_not_told():
     assert (told["N"], told["w"], told["hidden"]) == (10, 1, [128, 128])
     assert {of.metadata.get("key") or of.name for of in fields(TrainSettings)} - told.keys() == {
         "learning_rate_end",
+        "max_grad_norm",
         "weights",
     }
 
@@ -61,11 +65,12 @@ def test_whole_numbers_may_be_written_like_1e6():
     ("lines", "message"),
     [
         ({"learning_rat": 1}, "unknown key 'learning_rat'. Did you mean 'learning_rate'?"),
-        ({"horizon": 4}, "unknown key 'horizon'. Known: N, agent_steps"),
+        ({"horizon": 4}, "unknown key 'horizon'. Known: N, action_names"),
         ({"seed": "one"}, "has seed = 'one'. It must be a whole number."),
         ({"seed": 1.5}, "has seed = 1.5. It must be a whole number."),
         ({"seed": True}, "has seed = True. It must be a whole number."),
         ({"agent_steps": float("inf")}, "has agent_steps = inf. It must be a whole number."),
+        ({"gamma": 10**400}, f"has gamma = {10**400}. It must be a number."),
         ({"gamma": "0.9"}, "has gamma = '0.9'. It must be a number."),
         ({"learning_rate_end": [1]}, "has learning_rate_end = [1]. It must be a number."),
         ({"double": 1}, "has double = 1. It must be true or false."),
@@ -98,7 +103,7 @@ def test_a_configuration_says_what_it_is_for():
     ("lines", "message"),
     [
         ({"agent_steps": 0}, "`agent_steps` is 0. It must be 1 or more."),
-        ({"num_envs": 0}, "`num_envs` is 0. It must be 1 or more."),
+        ({"num_envs": 0}, "`num_envs` is 0. It must be from 1 to 10,000."),
         ({"checkpoint_every": -1}, "`checkpoint_every` is -1. It must be 1 or more."),
         ({"seed": -1}, "`seed` is -1. It must be 0 or more."),
         ({"seed": 2**63}, "It must be less than 2**63."),
@@ -106,13 +111,26 @@ def test_a_configuration_says_what_it_is_for():
         ({"epsilon_end": 1.5}, "`epsilon_end` is 1.5. It must be from 0 to 1."),
         ({"evaluate_epsilon": float("nan")}, "`evaluate_epsilon` is nan. It must be from 0 to 1."),
         ({"learning_rate": 0.0}, "learning rate is 0.0. Choose one above 0."),
-        ({"learning_rate_end": -0.1}, "`learning_rate_end` is -0.1. It must be 0 or more."),
-        ({"target_sync_updates": 0}, "target_sync_updates is 0."),
+        ({"learning_rate_end": -0.1}, "`learning_rate_end` is -0.1. It must be from 0 to 1."),
+        ({"target_sync_updates": 0}, "`target_sync_updates` is 0. It must be 1 or more."),
         ({"reduction": "max"}, "The reduction is 'max'. Use 'sum' or 'mean'."),
-        ({"hidden": [0]}, "`hidden` is (0,). It must be sizes above 0."),
+        ({"loss": "hubert"}, "The loss is 'hubert'. Use 'squared' or 'huber'."),
+        ({"precision": "half"}, "The precision is 'half'. Use 'float32' or 'bfloat16'."),
+        ({"max_grad_norm": 0.0}, "`max_grad_norm` is 0.0. Choose a length above 0."),
+        ({"max_grad_norm": float("nan")}, "`max_grad_norm` is nan. Choose a length above 0."),
+        ({"action_names": ["up", "up"]}, "The action names are 'up', 'up'. Each has a name of"),
+        ({"hidden": [0]}, "`hidden` is 0. It must be from 1 to 1,000,000."),
+        ({"N": 10**24}, f"`horizon` is {10**24}. It must be from 0 to 10,000."),
+        ({"hidden": [64, 10**7]}, "`hidden` is 10000000. It must be from 1 to 1,000,000."),
+        ({"agent_steps": 2**63}, f"`agent_steps` is {2**63}. It must be less than 2**63."),
+        (
+            {"batch_size": 33, "capacity": 32},
+            "A batch of 33 windows is larger than a replay memory "
+            "of 32 transitions. Choose a smaller `batch_size` or a larger `capacity`.",
+        ),
         ({"gamma": 1.0}, "gamma is 1.0. It must be at least 0 and less than 1"),
-        ({"N": -1}, "The horizon N is -1. It must be a whole number of at least 0."),
-        ({"w": 0}, "The width w is 0. It must be a whole number of at least 1."),
+        ({"N": -1}, "`horizon` is -1. It must be from 0 to 10,000."),
+        ({"w": 0}, "`width` is 0. It must be 1 or more."),
         (
             {"learning_starts": 15, "num_envs": 4, "w": 4},
             "`learning_starts` is 15: not one window of w = 4 steps is full by then. "
@@ -160,7 +178,7 @@ def test_updates_that_are_due():
 def test_an_update_is_told_its_share():
     settings = GYM.changed({"learning_rate": 0.25, "double": True, "reduction": "mean"})
     assert settings.update_settings == UpdateSettings(0.25, 250, "mean", double=True)
-    assert UpdateSettings() == UpdateSettings(1e-4, 1000, "sum", double=False, bf16=False)
+    assert UpdateSettings() == UpdateSettings(1e-4, 1000, "sum", double=False, precision="float32")
 
 
 def test_every_preset_can_be_used_and_says_what_it_is_for():

@@ -108,7 +108,7 @@ def test_without_explicit_components_updates_are_those_of_dqn():
     torch.testing.assert_close(weights(ours.q_network), weights(online), atol=1e-6, rtol=0)
 
 
-@pytest.mark.parametrize("settings", [{}, {"double": True}, {"bf16": True}])
+@pytest.mark.parametrize("settings", [{}, {"double": True}, {"precision": "bfloat16"}])
 def test_the_same_seed_learns_the_same_to_the_bit(settings):
     runs = [learner(seed=seed, **settings) for seed in (3, 3, 4)]
     for run in runs:
@@ -117,6 +117,20 @@ def test_the_same_seed_learns_the_same_to_the_bit(settings):
     one, same, other = (weights(run.q_network) for run in runs)
     assert torch.equal(one, same)
     assert not torch.equal(one, other)
+
+
+def test_longer_gradients_are_cut_and_shorter_ones_left():
+    batch = random_batch(0)
+    plain, left, cut = learner(), learner(max_grad_norm=1e6), learner(max_grad_norm=0.5)
+    for run in (plain, left, cut):
+        run.update(batch)
+    flat = [
+        torch.cat([p.grad.flatten() for p in run.q_network.parameters()])
+        for run in (plain, left, cut)
+    ]
+    assert flat[0].norm() > 0.5
+    assert torch.equal(flat[0], flat[1])
+    torch.testing.assert_close(flat[2], flat[0] * 0.5 / flat[0].norm())
 
 
 def test_the_target_network_follows_every_few_updates():
@@ -164,12 +178,12 @@ def test_other_settings_are_not_resumed():
 
 
 @pytest.mark.parametrize("double", [False, True])
-def test_bf16_gives_nearly_the_same_gradients(double):
+def test_bfloat16_gives_nearly_the_same_gradients(double):
     """Autocast caches cast weights: those of the target's side must not cut off the gradient."""
     gradients = []
-    for bf16 in (False, True):
+    for precision in ("float32", "bfloat16"):
         network = build_network(ATARI, 2, AXIS)
-        run = Learner(network, UpdateSettings(double=double, bf16=bf16))
+        run = Learner(network, UpdateSettings(double=double, precision=precision))
         rng = np.random.default_rng(0)
         images = rng.integers(0, 256, (2, 4, *ATARI.shape), dtype=np.uint8)
         run.update(Batch(images[0], [0, 1, 1, 0], np.ones(4), np.full(4, 0.9), images[1]))
@@ -209,8 +223,9 @@ def test_a_batch_that_does_not_fit_is_refused(changed, message):
     [
         ({"learning_rate": 0.0}, r"learning rate is 0\.0"),
         ({"learning_rate": float("nan")}, r"learning rate is nan"),
-        ({"target_sync_updates": 0}, r"target_sync_updates is 0"),
+        ({"target_sync_updates": 0}, r"target_sync_updates` is 0"),
         ({"reduction": "max"}, r"reduction is 'max'"),
+        ({"precision": "bfloat"}, r"precision is 'bfloat'\. Use 'float32' or"),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, message):

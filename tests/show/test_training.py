@@ -1,6 +1,5 @@
 """Runs on a terminal: what is shown is what is known, in 80 columns, with or without UTF-8."""
 
-import io
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -8,33 +7,27 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console, RenderableType
+from rich.text import Text
 
 from trdlab.deep.settings import TrainSettings
 from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary
-from trdlab.show.training import duration, evaluation_page, memory_line, plan_page, runs_table
+from trdlab.show.text import plain_ascii
+from trdlab.show.training import duration, evaluation_page, memory_line, plan_page, runs_page
 from trdlab.training.setup import Plan
 
 CART = TrainSettings("gym", "CartPole-v1", horizon=40)
 
 
-def text(page: RenderableType, width: int = 80, *, whole_lines: bool = False) -> str:
-    console = Console(file=io.StringIO(), width=width, highlight=False)
-    console.print(page, soft_wrap=whole_lines)
-    shown = console.file.getvalue()  # type: ignore[attr-defined]
-    assert whole_lines or max(map(len, shown.splitlines())) <= width
-    return str(shown)
-
-
-def words(page: RenderableType, width: int = 80) -> str:
-    return " ".join(text(page, width).split())
+def words(page: Text, width: int = 80) -> str:
+    assert max(map(len, page.plain.splitlines())) <= width
+    return " ".join(page.plain.split())
 
 
 def test_a_plan_shows_a_configuration_that_can_be_used_and_what_it_takes():
     settings = CART.changed({"weights": "/a" * 60, "hidden": [7] * 40})
     plan = Plan(settings, 2_100_000_000, 24_000_000_000, 20_000, 123.4)
-    shown = text(plan_page(plan), whole_lines=True)
+    shown = plan_page(plan).plain
     lines, _, rest = shown.partition("\n\n")
     assert tomllib.loads(lines) == settings.to_config()
     assert "Replay memory: up to 2.10 GB, of 24.00 GB that are free." in rest
@@ -117,26 +110,34 @@ def summary(name: str = "run", **known: Any) -> RunSummary:
             "run CartPole-v1 40 1 20,000 195.0 training (process 77)",
         ),
         ({"pid": 0}, "run CartPole-v1 40 1 0 training"),
-        ({"config": {}, "fault": "'x' is torn."}, "run 'x' is torn."),
-        ({"config": {"kind": "gym"}}, "run Its config.toml does not say 'env'. Add it."),
+        ({"config": {}, "fault": "'x' is torn."}, "run cannot be read run: 'x' is torn."),
+        ({"config": {"kind": "gym"}}, "run: Its config.toml does not say 'env'. Add it."),
         (
             {"config": CART.to_config() | {"agent_steps": "many"}},
-            "run Its config.toml has agent_steps = 'many'. It must be a whole number.",
+            "run: Its config.toml has agent_steps = 'many'. It must be a whole number.",
         ),
         ({"metrics": {"score": None, "agent_steps": 5}}, "run CartPole-v1 40 1 5 no checkpoint"),
     ],
 )
 def test_how_a_run_stands(known, row):
-    assert row in words(runs_table([summary(**known)]), width=100)
+    assert row in words(runs_page([summary(**known)], width=80))
 
 
 def test_names_are_not_markup_and_any_terminal_can_show_them():
-    shown = words(runs_table([summary("[red]…γ"), summary("b", fault="[/]")]))
+    shown = words(runs_page([summary("[red]…γ"), summary("b", fault="[/]")], width=80))
     assert "[red]…γ" in shown
     assert "[/]" in shown
     for page in (
-        runs_table([summary("[red]…γ"), summary("ü")], ascii_only=True),
-        evaluation_page(evaluation([1.0, 2.0]), ascii_only=True),
-        plan_page(Plan(CART.changed({"env_arg": ["map=ü…"]}), 1, None, 1, 1), ascii_only=True),
+        runs_page([summary("[red]…γ"), summary("ü")]),
+        evaluation_page(evaluation([1.0, 2.0])),
+        plan_page(Plan(CART.changed({"env_arg": ["map=ü…"]}), 1, None, 1, 1)),
     ):
-        assert text(page).isascii()
+        assert plain_ascii(page).plain.isascii()
+
+
+def test_on_a_narrow_terminal_no_number_is_cut():
+    runs = [summary(step=100_000, metrics={"agent_steps": 1, "score": 195.04})]
+    shown = words(runs_page(runs, width=24), width=24)
+    assert "environment CartPole-v1 N 40 w 1 steps 100,000 score 195.0 status done" in shown
+    shown = words(evaluation_page(evaluation([1500.0, 2500.25]), width=24), width=24)
+    assert "mean return 2,000.1 95 % interval" in shown

@@ -1,5 +1,6 @@
 """A run in its folder: begun, resumed, and refused with nothing lost where something is wrong."""
 
+import builtins
 import errno
 import hashlib
 import json
@@ -51,16 +52,29 @@ LINES = {
 
 
 class Faulty(CartPoleEnv):
-    """Pays a number of its choice in one of its steps, counted over episodes."""
+    """Pays a number of its choice, or fails, in one of its steps, counted over episodes."""
 
-    def __init__(self, at: int = 10**9, pays: str = "nan") -> None:
+    def __init__(self, at: int = 10**9, pays: str = "nan", fails: str = "") -> None:
         super().__init__()
-        self.steps, self.at, self.pays = 0, at, float(pays)
+        self.steps, self.at, self.pays, self.fails = 0, at, float(pays), fails
 
     def step(self, action: Any) -> Any:
         observation, reward, *rest = super().step(action)
         self.steps += 1
+        if self.steps == self.at and self.fails:
+            raise getattr(builtins, self.fails)(errno.EPIPE, "the simulator has gone")
         return observation, self.pays if self.steps == self.at else reward, *rest
+
+
+class NotReady(CartPoleEnv):
+    """Shows what is no number in the fifth of its episodes that this process begins."""
+
+    begun = 0
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        seen, info = super().reset(seed=seed)
+        NotReady.begun += 1
+        return seen * np.nan if NotReady.begun == 5 else seen, info
 
 
 class Grown(CartPoleEnv):
@@ -81,9 +95,10 @@ class Wayward(CartPoleEnv):
 @pytest.fixture(autouse=True, scope="module")
 def _registered() -> Iterator[None]:
     gym.register("Faulty-v0", Faulty)
+    gym.register("NotReady-v0", NotReady, max_episode_steps=20)
     gym.register("Wayward-v0", Wayward)
     yield
-    del gym.registry["Faulty-v0"], gym.registry["Wayward-v0"]
+    del gym.registry["Faulty-v0"], gym.registry["NotReady-v0"], gym.registry["Wayward-v0"]
 
 
 def settings(env: str = "CartPole-v1", **lines: Any) -> TrainSettings:
@@ -217,6 +232,18 @@ def test_a_run_without_a_checkpoint_begins_again(tmp_path, whole, steps):
     assert result(finish(out)) == result(whole)
 
 
+def test_the_precision_that_was_measured_is_kept(tmp_path, monkeypatch):
+    quicker = "trdlab.deep.precision.quicker_precision"
+    monkeypatch.setattr(quicker, lambda *_: "bfloat16")
+    whole = train(tmp_path / "whole", precision="auto")
+    out = train_until(50, tmp_path / "run", precision="auto")
+    monkeypatch.setattr(quicker, lambda *_: "float32")  # on another day, or machine
+    assert result(finish(out)) == result(whole)
+    assert RunFolder.open(out).config["precision"] == "bfloat16"
+    exact = train(tmp_path / "exact", precision="float32")
+    assert result(exact) != result(whole)
+
+
 def test_an_older_checkpoint_can_be_gone_back_to(trained, whole):
     assert result(finish(trained, step=90)) == result(whole)
     with pytest.raises(InputError, match=r"no checkpoint at step 60\. There are: 90, 120\."):
@@ -324,7 +351,7 @@ def test_a_torn_checkpoint_is_named_with_one_that_is_whole(trained, whole, trdla
     torn = trained / "checkpoints" / "000000120" / "memory.safetensors"
     torn.write_bytes(torn.read_bytes()[:-1])
     before = contents(trained)
-    message = "The one at step 90 is whole: `checkpoint=90`, or"
+    message = "The one at step 90 is whole: --checkpoint 90, or"
     refused(trdlab("resume", trained), 1, message)
     assert contents(trained).items() >= before.items()
     assert trdlab("resume", trained, "--checkpoint", 90)[0] == 0
@@ -390,6 +417,45 @@ def test_a_disk_that_fills_up(tmp_path, whole, trdlab, monkeypatch, failing):
     code, _, err = trdlab("resume", out)
     assert (code, "error" in err) == (0, False)
     assert result(out) == result(whole)
+
+
+def test_a_first_observation_that_is_no_number_is_refused_and_the_run_goes_on(tmp_path, trdlab):
+    NotReady.begun, out = 0, tmp_path / "run"
+    config = written(tmp_path, settings("NotReady-v0"))
+    outcome = trdlab("train", "gym", "NotReady-v0", "--config", config, "--out", out)
+    refused(outcome, 1, "The environment gave the observation nan after ")
+    assert outcome[2].endswith(f"Correct the environment. Go on: trdlab resume {out}\n")
+    state = load_checkpoint(RunFolder.open(out)).state
+    assert np.isfinite(state["stack"]).all()
+    assert trdlab("resume", out)[0] == 0
+    assert result(out) == result(train(tmp_path / "whole", "NotReady-v0"))
+    NotReady.begun = 4
+    outcome = trdlab("train", "gym", "NotReady-v0", "--config", config, "--out", tmp_path / "no")
+    refused(outcome, 1, "gave the observation nan when it was reset.")
+    assert not (tmp_path / "no").exists()
+    NotReady.begun = 4
+    refused(trdlab("evaluate", out), 2, "The observations hold nan.")
+
+
+@pytest.mark.parametrize(
+    "fails", ["BrokenPipeError", "ConnectionResetError", "FileNotFoundError", "ZeroDivisionError"]
+)
+def test_an_environment_that_fails_is_blamed(tmp_path, whole, trdlab, fails):
+    out, config = tmp_path / "run", written(tmp_path, settings("Faulty-v0"))
+    words = ["train", "gym", "Faulty-v0", "--config", config, "--out", out]
+    outcome = trdlab(*words, "--env-arg", "at=75", "--env-arg", f"fails={fails}")
+    refused(outcome, 1, f"The environment failed at agent step 75 ({fails}: ")
+    assert "the simulator has gone" in outcome[2]
+    assert outcome[2].endswith(f"). Correct it. Go on: trdlab resume {out}\n")
+    assert checkpoint_steps(RunFolder.open(out)) == [30, 60]
+
+
+def test_an_environment_that_fails_in_an_evaluation_is_blamed(tmp_path, trdlab):
+    told = settings("Faulty-v0", env_arg=["at=5", "fails=BrokenPipeError"])
+    with begin(told, tmp_path / "run") as run:
+        carry_on(run, should_stop=lambda: True)
+    outcome = trdlab("evaluate", tmp_path / "run", "--episodes", 1)
+    refused(outcome, 1, "The environment failed at step 5 of an episode (BrokenPipeError: ")
 
 
 @pytest.mark.parametrize("pays", ["nan", "inf", "-inf"])

@@ -13,13 +13,13 @@ from trdlab.deep.settings import TrainSettings
 from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.runs import to_toml
+from trdlab.training.machine import resolved
 from trdlab.training.setup import (
     default_path,
     describe,
     make_environments,
     plan,
     read_settings,
-    resolved,
 )
 
 CART = TrainSettings("gym", "CartPole-v1")

@@ -5,11 +5,18 @@ from contextlib import redirect_stdout
 
 import gymnasium as gym
 import numpy as np
-from ale_py import AtariVectorEnv
-from gymnasium.vector import AutoresetMode
 
 from trdlab.atari.names import rom_name
 from trdlab.errors import InputError, TrdlabError
+
+try:
+    from ale_py import AtariVectorEnv
+    from gymnasium.vector import AutoresetMode
+except ImportError as _error:
+    raise InputError(
+        f"Atari games need Gymnasium 1.1 or later, and this is {gym.__version__}.",
+        "Run: pip install 'gymnasium>=1.1'",
+    ) from _error
 
 SIDE = 84
 STACK = 4

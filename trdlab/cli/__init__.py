@@ -1,5 +1,6 @@
 """The command line: parse, call, print."""
 
+import os
 import re
 import sys
 from collections.abc import Sequence
@@ -17,6 +18,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     from trdlab.cli.app import new_app
 
+    if arguments is None:  # pictures need no backend of the user's, which may be that of a notebook
+        os.environ["MPLBACKEND"] = "agg"
     words = sys.argv[1:] if arguments is None else list(arguments)
     usage_error: Any = typer.BadParameter.__base__  # it has no public name in all versions
     try:

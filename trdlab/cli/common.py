@@ -159,7 +159,7 @@ def print_page(thing: Any, *, details: bool) -> None:
     """Prints a noun of trdlab as people read it."""
     from trdlab.show.text import text
 
-    _print(text(thing, details=details))
+    print_text(text(thing, details=details))
 
 
 def print_line(line: str, style: str = "") -> None:
@@ -167,10 +167,11 @@ def print_line(line: str, style: str = "") -> None:
     from trdlab.show.text import columns, wrapped
 
     for part in wrapped(line, columns(), style):
-        _print(part)
+        print_text(part)
 
 
-def _print(shown: "Text") -> None:
+def print_text(shown: "Text") -> None:
+    """Prints a text as it is, in letters that the terminal has."""
     from trdlab.show.text import columns, plain_ascii
 
     console, ascii_only = new_console()

@@ -69,8 +69,8 @@ def _option(key: str, default: Any) -> inspect.Parameter:
         names = f"{names}/--no-{names.removeprefix('--')}"
     elif key == "env_arg":  # given once for each
         kind, default = list[str], None
-    elif key == "hidden":
-        kind, default = str, ",".join(map(str, default))
+    elif isinstance(of.default, tuple):
+        kind, default = str, ",".join(map(str, default or ())) or None
     about = typer.Option(
         names,
         metavar=of.metadata["metavar"],
@@ -85,10 +85,12 @@ def _option(key: str, default: Any) -> inspect.Parameter:
 
 def _given(key: str, value: Any) -> Any:
     """Returns an option's value as the configuration writes it; None where it was not used."""
-    if key != "hidden" or value is None:
+    of = _keys()[key]
+    if value is None or key == "env_arg" or not isinstance(of.default, tuple):
         return value
+    words = [word.strip() for word in value.split(",") if word.strip()]
     try:
-        return [int(size) for size in value.split(",") if size.strip()]
+        return [of.metadata["kind"](word) for word in words]
     except ValueError as error:
         raise typer.BadParameter(
             f"{flag(key)} is '{value}': give sizes, such as 128,128"

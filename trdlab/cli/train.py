@@ -157,8 +157,7 @@ def evaluate(
     if as_json:
         common.print_json(result.to_dict())
     else:
-        console, ascii_only = common.new_console()
-        console.print(evaluation_page(result, ascii_only=ascii_only))
+        common.print_text(evaluation_page(result))
     _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
 
 
@@ -174,18 +173,17 @@ def runs(
 ) -> None:
     """List the runs in a folder: what they learn, how far they are, and their score."""
     from trdlab.runs import list_runs
-    from trdlab.show.training import runs_table
+    from trdlab.show.training import runs_page
 
     if plot is not None:
         from trdlab.show.plots.style import check_picture
 
         check_picture(plot, overwrite=overwrite)
-    console, ascii_only = common.new_console()
     found = list_runs(folder)
     if not found:
-        console.print(f"There are no runs in '{folder}'.", soft_wrap=True, markup=False)
+        _say(common.new_console()[0], f"There are no runs in '{folder}'.")
         return
-    console.print(runs_table(found, ascii_only=ascii_only))
+    common.print_text(runs_page(found))
     if plot is not None:
         from trdlab.show.plots.style import save
         from trdlab.show.plots.training import curves_figure
@@ -210,9 +208,7 @@ def _train(
     if dry_run:
         from trdlab.show.training import plan_page
 
-        console, ascii_only = common.new_console()
-        page = plan_page(plan(settings), ascii_only=ascii_only)
-        console.print(page, soft_wrap=True)  # so that the configuration can be copied
+        common.print_text(plan_page(plan(settings)))
         return
     _carry_on(lambda: begin(settings, out))
 
@@ -221,12 +217,15 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
     """Trains a run to its end or to the next signal, and evaluates it at the end."""
     from trdlab.cli.progress import TrainingProgress, stopping
     from trdlab.deep.memory import available_memory
+    from trdlab.environments.faults import EnvironmentFault
+    from trdlab.errors import OutputError
     from trdlab.show.training import duration, memory_line, updates_lines
     from trdlab.training.run import carry_on
 
     errors = _errors()
     with stopping() as stop, open_run() as run:
         path, settings = run.folder.path, run.trainer.settings
+        go_on = f"Go on: {run.folder.resume_command}"
         _say(errors, f"Run: {path}")
         _say(errors, memory_line(run.memory, available_memory()))
         for line in updates_lines(settings):
@@ -234,16 +233,19 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
         if run.problem is not None:
             _say(errors, f"{run.problem.cause} New episodes are begun in their place.")
         with TrainingProgress(errors, settings.agent_steps, run.trainer.agent_steps) as progress:
-            done = carry_on(
-                run,
-                on_metrics=progress.on_metrics,
-                on_step=progress.on_step,
-                should_stop=stop,
-            )
+            try:
+                done = carry_on(
+                    run,
+                    on_metrics=progress.on_metrics,
+                    on_step=progress.on_step,
+                    should_stop=stop,
+                )
+            except (EnvironmentFault, OutputError) as error:  # which can be mended from outside
+                raise type(error)(error.cause, f"{error.cure} {go_on}") from error
         steps = run.trainer.agent_steps
         if not done:
             _say(errors, f"Stopped and saved at {steps:,} agent steps.")
-            _say(errors, f"Go on: {run.folder.resume_command}")
+            _say(errors, go_on)
             raise typer.Exit(stop.code or 0)
     _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
     if settings.evaluate_episodes:

@@ -50,7 +50,8 @@ class NetworkEstimator:
         """Returns `[B, A, N+1]`, float32, for a batch `[B, ...]` of observations.
 
         Raises:
-            InputError: the observations have another shape or type than the network takes.
+            InputError: the observations have another shape or type than the network takes, or hold
+                what is no number.
         """
         array = np.array(observations)  # [B, ...], a copy that PyTorch may own
         if array.dtype.kind not in "fiub":
@@ -61,6 +62,12 @@ class NetworkEstimator:
             )
         if array.ndim == 0:
             raise InputError("The observations have shape ().", "Give a batch [B, ...] of them.")
+        finite = np.isfinite(array)
+        if not finite.all():
+            raise InputError(
+                f"The observations hold {array[~finite][0]}.",
+                "Give finite numbers; an environment that shows others must be corrected.",
+            )
         was_training = self.network.training
         self.network.eval()
         try:

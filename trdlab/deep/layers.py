@@ -15,13 +15,13 @@ LEAST_SIDE = 36
 """The side of the smallest image that they can read."""
 
 
-def linear(inputs: int, outputs: int, rng: torch.Generator) -> nn.Linear:
+def linear(inputs: int, outputs: int, rng: torch.Generator | None) -> nn.Linear:
     """Returns a fully connected layer."""
     return _drawn(nn.Linear(inputs, outputs, device="meta"), inputs, rng)
 
 
 def convolution(
-    channels: int, filters: int, kernel: int, stride: int, rng: torch.Generator
+    channels: int, filters: int, kernel: int, stride: int, rng: torch.Generator | None
 ) -> nn.Conv2d:
     """Returns a square convolution without padding."""
     layer = nn.Conv2d(channels, filters, kernel, stride=stride, device="meta")
@@ -39,8 +39,13 @@ def side_after_convolutions(side: int) -> int:
     return side
 
 
-def _drawn(layer: Layer, fan_in: int, rng: torch.Generator) -> Layer:
-    """Returns a layer from the meta device, where nothing was drawn yet, with its weights."""
+def _drawn(layer: Layer, fan_in: int, rng: torch.Generator | None) -> Layer:
+    """Returns a layer from the meta device, where nothing was drawn yet, with its weights.
+
+    Without a generator it stays there: it has shapes, and takes no memory.
+    """
+    if rng is None:
+        return layer
     layer.to_empty(device="cpu")
     bound = 1.0 / math.sqrt(fan_in)
     for parameter in layer.parameters():

@@ -1,12 +1,13 @@
 """The target and the loss: small pure functions on tensors."""
 
 import math
+from typing import get_args
 
 import torch
 from torch import Tensor
 
 from trdlab import bellman
-from trdlab.deep.settings import Reduction
+from trdlab.deep.settings import Loss, Reduction
 from trdlab.errors import InputError, TrdlabError
 
 
@@ -54,28 +55,45 @@ def trd_target(
 
 
 def td_loss(
-    components: Tensor, actions: Tensor, target: Tensor, reduction: Reduction = "sum"
+    components: Tensor,
+    actions: Tensor,
+    target: Tensor,
+    reduction: Reduction = "sum",
+    loss: Loss = "squared",
 ) -> Tensor:
-    """Returns the squared error of the components, averaged over the batch; a scalar.
+    """Returns the error of the components, averaged over the batch; a scalar.
+
+    With s the squared errors of a sample's components, summed or averaged, it is s itself, or
+    Huber's 2√s − 1 where s is above 1.
 
     Summed over components, the loss of N = 0 is that of plain DQN, and each component pulls as
     hard as it, whatever N. The paper takes the mean over components: its loss shrinks by 1/(N+1)
     against any other loss beside it (errata C5). Alone under Adam the two hardly differ.
+
+    A squared error is least at the mean, and a component is one. Huber's is least somewhere between
+    mean and median, so amounts that come seldom are told too small; in return a few surprises do
+    not drown the rest of a batch. It is taken of the length of a sample's vector of errors, not
+    of each component: most rewards come at one step of many, so the median of each component is 0,
+    and all of them would be told as nothing. For N = 0 it is the loss that DQN clips its errors by.
 
     Args:
         components: `[B, A, N+1]` of the network that learns.
         actions: `[B]`, whole numbers, what was done.
         target: `[B, N+1]`, taken as given: no gradient flows into it.
         reduction: over components, `sum`, or `mean` as in the paper.
+        loss: `squared`, as in the paper, or `huber`.
 
     Raises:
-        InputError: the shapes do not fit, or the actions are no whole numbers.
+        InputError: the shapes do not fit, the actions are no whole numbers, or there is no such
+            reduction or loss.
 
-    Source: the paper's Eq. trd-loss.
+    Source: the paper's Eq. trd-loss; Huber (1964), as in Mnih et al. (2015).
 
     >>> online = torch.tensor([[[1.0, 1.0], [0.0, 0.0]]])
-    >>> td_loss(online, torch.tensor([0]), torch.tensor([[2.0, 4.0]]))
-    tensor(10.)
+    >>> td_loss(online, torch.tensor([0]), torch.tensor([[4.0, 5.0]]))
+    tensor(25.)
+    >>> td_loss(online, torch.tensor([0]), torch.tensor([[4.0, 5.0]]), loss="huber")
+    tensor(9.)
     """
     chosen = of_actions(components, actions)  # [B, N+1]
     if target.shape != chosen.shape:
@@ -84,12 +102,17 @@ def td_loss(
             f"{tuple(chosen.shape)}.",
             "Give [B, N+1].",
         )
-    squared_errors = (chosen - target.detach()).square()  # [B, N+1]
-    if reduction == "sum":
-        return squared_errors.sum(dim=1).mean()
-    if reduction == "mean":
-        return squared_errors.mean()
-    raise InputError(f"The reduction is {reduction!r}.", "Use 'sum' or 'mean'.")
+    for name, value, known in (
+        ("reduction", reduction, get_args(Reduction)),
+        ("loss", loss, get_args(Loss)),
+    ):
+        if value not in known:
+            raise InputError(f"The {name} is {value!r}.", f"Use {' or '.join(map(repr, known))}.")
+    squared = (chosen - target.detach()).square()  # [B, N+1]
+    errors = squared.sum(dim=1) if reduction == "sum" else squared.mean(dim=1)  # [B]
+    if loss == "huber":
+        errors = torch.where(errors > 1.0, 2.0 * errors.clamp(min=1.0).sqrt() - 1.0, errors)  # [B]
+    return errors.mean()
 
 
 def of_actions(components: Tensor, actions: Tensor) -> Tensor:

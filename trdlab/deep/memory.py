@@ -81,6 +81,24 @@ def check_memory(needed: int, capacity: int, available: int | None = None) -> No
     )
 
 
+def check_learner(needed: int, available: int | None) -> None:
+    """Refuses a network that does not fit, with the batch that it is to learn from.
+
+    Args:
+        needed: its bytes, see `trdlab.deep.networks.learner_nbytes`.
+        available: the bytes that are free; None if unknown.
+
+    Raises:
+        TrdlabError: it does not fit into nine tenths of what is free.
+    """
+    if available is not None and needed > 0.9 * available:
+        raise TrdlabError(
+            f"Learning with this network and batch takes about {needed / 1e9:.2f} GB, and "
+            f"{available / 1e9:.2f} GB is free.",
+            "Choose smaller layers, a smaller N or a smaller batch, or free some memory.",
+        )
+
+
 def available_memory() -> int | None:
     """Returns the bytes that are free, as the system or the container says; None if unknown."""
     found = []

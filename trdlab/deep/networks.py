@@ -97,7 +97,7 @@ class NatureNetwork(DecompositionNetwork):
         num_actions: int,
         num_components: int,
         *,
-        rng: torch.Generator,
+        rng: torch.Generator | None,
         channels_last: bool = True,
     ) -> None:
         channels, height, width = observation_shape
@@ -150,7 +150,7 @@ class VectorNetwork(DecompositionNetwork):
         num_components: int,
         *,
         hidden: Sequence[int],
-        rng: torch.Generator,
+        rng: torch.Generator | None,
         num_states: int | None = None,
         first_state: int = 0,
         bounds: tuple[FloatArray, FloatArray] | None = None,
@@ -196,7 +196,7 @@ def build_network(
     num_actions: int,
     time_axis: TimeAxis,
     *,
-    seed: int | torch.Generator = 0,
+    seed: int | torch.Generator | None = 0,
     hidden: Sequence[int] = (128, 128),
     channels_last: bool = True,
 ) -> DecompositionNetwork:
@@ -210,7 +210,8 @@ def build_network(
         observation_space: of one observation.
         num_actions: A (see `count_actions`).
         time_axis: its N sets the size of the head.
-        seed: a number, or a generator to go on drawing from.
+        seed: a number, or a generator to go on drawing from; with None there are no weights, only
+            their shapes.
         hidden: the sizes of the MLP's hidden layers.
         channels_last: the CNN's memory layout; it changes speed, not the weights.
 
@@ -222,7 +223,7 @@ def build_network(
     >>> network(torch.zeros(2, 4, 84, 84, dtype=torch.uint8)).shape
     torch.Size([2, 4, 41])
     """
-    rng = seed if isinstance(seed, torch.Generator) else torch.Generator().manual_seed(seed)
+    rng = torch.Generator().manual_seed(seed) if isinstance(seed, int) else seed
     outputs = (num_actions, time_axis.num_components)
     if isinstance(observation_space, gym.spaces.Discrete):
         states, first = int(observation_space.n), int(observation_space.start)
@@ -245,6 +246,28 @@ def build_network(
     low, high = observation_space.low, observation_space.high
     bounds = low.astype(np.float64).ravel(), high.astype(np.float64).ravel()
     return VectorNetwork(shape, *outputs, hidden=hidden, rng=rng, bounds=bounds)
+
+
+def learner_nbytes(network: DecompositionNetwork, batch_size: int) -> int:
+    """Returns the bytes that learning with a network takes, roughly: those that grow with it.
+
+    Five numbers for each weight (online, target, gradient and Adam's two), and four for what each
+    layer makes of each window of a batch.
+
+    Args:
+        network: as `build_network` returns it; with or without weights.
+        batch_size: the windows in a batch.
+
+    >>> space = gym.spaces.Box(-1, 1, (4,))
+    >>> network = build_network(space, 2, TimeAxis(0.99, 9), hidden=[100], seed=None)
+    >>> learner_nbytes(network, 10)  # 4·(5·2520 + 10·4·(4 + 100 + 20))
+    70240
+    """
+    weights = sum(weight.numel() for weight in network.parameters())
+    made = math.prod(network.observation_shape)
+    for layer in network.modules():
+        made += getattr(layer, "out_features", 0)
+    return 4 * (5 * weights + 4 * batch_size * made)
 
 
 def count_actions(action_space: gym.Space[Any]) -> int:

@@ -58,7 +58,7 @@ PRESETS["atari"]["smoke"] = (
         "epsilon_steps": 4_000,
         "learning_starts": 1_000,
         "capacity": 10_000,
-        "bf16": True,
+        "precision": "auto",
         "evaluate_episodes": 5,
         "evaluate_epsilon": 0.05,
         "checkpoint_every": 1_000,

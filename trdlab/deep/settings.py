@@ -4,14 +4,17 @@ No torch here: options are read, listed and refused before anything heavy is imp
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, Self, get_args
 
 from trdlab.decomposition import TimeAxis
+from trdlab.deep.options import check_range, option, typed
 from trdlab.errors import InputError, closest
 
 Kind = Literal["gym", "atari"]
 Reduction = Literal["sum", "mean"]
+Loss = Literal["squared", "huber"]
+Precision = Literal["float32", "bfloat16"]
 
 
 @dataclass(frozen=True)
@@ -23,9 +26,11 @@ class UpdateSettings:
         target_sync_updates: the updates, not agent steps, between two copies of the network to
             the target network (errata C6).
         reduction: over components, see `td_loss`.
+        loss: of their errors, see there.
+        max_grad_norm: the length to which longer gradients are cut; None leaves them.
         double: whether the online network chooses the next action (double DQN).
-        bf16: whether the networks compute in bfloat16, which keeps two or three digits; weights,
-            targets and the loss stay float32.
+        precision: what the networks compute in; bfloat16 keeps two or three digits. Weights,
+            targets and the loss are float32 in either case.
 
     Raises:
         InputError: a value is out of its range.
@@ -34,42 +39,32 @@ class UpdateSettings:
     learning_rate: float = 1e-4
     target_sync_updates: int = 1000
     reduction: Reduction = "sum"
+    loss: Loss = "squared"
+    max_grad_norm: float | None = None
     double: bool = False
-    bf16: bool = False
+    precision: Precision = "float32"
 
     def __post_init__(self) -> None:
         if not 0.0 < self.learning_rate < float("inf"):
             raise InputError(f"The learning rate is {self.learning_rate}.", "Choose one above 0.")
         if self.target_sync_updates < 1:
             raise InputError(
-                f"target_sync_updates is {self.target_sync_updates}.",
+                f"`target_sync_updates` is {self.target_sync_updates}.",
                 "Copy the network every 1 or more updates.",
             )
-        if self.reduction not in get_args(Reduction):
-            raise InputError(f"The reduction is {self.reduction!r}.", "Use 'sum' or 'mean'.")
-
-
-def _option(
-    default: Any,
-    about: str,
-    panel: str,
-    *,
-    key: str | None = None,
-    kind: type | None = None,
-    metavar: str | None = None,
-) -> Any:
-    """Returns a field that is an option of the commands, and a line of the configuration.
-
-    Args:
-        default: its value where nothing is said.
-        about: the help.
-        panel: under which heading the help stands.
-        key: what it is called outside, if not like the field.
-        kind: the type of its values, or of their elements; by default that of the default.
-        metavar: what the help calls a value, if not by its type.
-    """
-    metadata = {"help": about, "panel": panel, "key": key, "metavar": metavar}
-    return field(default=default, metadata={**metadata, "kind": kind or type(default)})
+        longest = self.max_grad_norm
+        if longest is not None and not 0.0 < longest < float("inf"):
+            raise InputError(f"`max_grad_norm` is {longest}.", "Choose a length above 0.")
+        for name, known in (
+            ("loss", get_args(Loss)),
+            ("reduction", get_args(Reduction)),
+            ("precision", get_args(Precision)),
+        ):
+            if getattr(self, name) not in known:
+                raise InputError(
+                    f"The {name} is {getattr(self, name)!r}.",
+                    f"Use {' or '.join(map(repr, known))}.",
+                )
 
 
 @dataclass(frozen=True)
@@ -92,76 +87,133 @@ class TrainSettings:
 
     kind: Kind
     env: str
-    env_arg: tuple[str, ...] = _option(
+    env_arg: tuple[str, ...] = option(
         (), "To make the environment with.", "Run", kind=str, metavar="KEY=VALUE"
     )
-    seed: int = _option(1, "Of the weights, the environments and every choice.", "Run")
-    agent_steps: int = _option(100_000, "Steps to take, of all environments together.", "Run")
-    num_envs: int = _option(1, "Environments side by side.", "Run")
-    gamma: float = _option(0.99, "Discount factor of a step, in [0, 1).", "Time axis")
-    horizon: int = _option(10, "Number of explicit components; 0 is DQN.", "Time axis", key="N")
-    width: int = _option(1, "Steps in each component.", "Time axis", key="w")
-    epsilon_start: float = _option(1.0, "Chance of a random action at first.", "Acting")
-    epsilon_end: float = _option(0.05, "… and in the end.", "Acting")
-    epsilon_steps: int = _option(10_000, "Agent steps from the one to the other.", "Acting")
-    learning_starts: int = _option(
-        1_000, "Agent steps, at random, before the first update.", "Learning"
+    action_names: tuple[str, ...] = option(
+        (),
+        "What to call the actions; without it, as the environment does.",
+        "Run",
+        kind=str,
+        metavar="NAME,NAME",
     )
-    update_every: int = _option(4, "Agent steps for each update.", "Learning")
-    batch_size: int = _option(32, "Windows in each update.", "Learning")
-    learning_rate: float = _option(1e-3, "Adam's, at first.", "Learning")
-    learning_rate_end: float | None = _option(
-        None, "… and in the end, falling evenly; without it, the same.", "Learning", kind=float
+    seed: int = option(1, "Of the weights, the environments and every choice.", "Run", least=0)
+    agent_steps: int = option(
+        100_000, "Steps to take, of all environments together.", "Run", least=1
     )
-    target_sync_updates: int = _option(
-        250, "Updates (not steps) between copies to the target network.", "Learning"
+    num_envs: int = option(1, "Environments side by side.", "Run", least=1, most=10_000)
+    gamma: float = option(0.99, "Discount factor of a step, in [0, 1).", "Time axis")
+    horizon: int = option(
+        10, "Number of explicit components; 0 is DQN.", "Time axis", key="N", least=0, most=10_000
     )
-    reduction: Literal["sum", "mean"] = _option(
+    width: int = option(1, "Steps in each component.", "Time axis", key="w", least=1)
+    epsilon_start: float = option(
+        1.0, "Chance of a random action at first.", "Acting", least=0, most=1
+    )
+    epsilon_end: float = option(0.05, "… and in the end.", "Acting", least=0, most=1)
+    epsilon_steps: int = option(10_000, "Agent steps from the one to the other.", "Acting", least=0)
+    learning_starts: int = option(
+        1_000, "Agent steps, at random, before the first update.", "Learning", least=1
+    )
+    update_every: int = option(4, "Agent steps for each update.", "Learning", least=1)
+    batch_size: int = option(32, "Windows in each update.", "Learning", least=1)
+    learning_rate: float = option(1e-3, "Adam's, at first.", "Learning")
+    learning_rate_end: float | None = option(
+        None,
+        "… and in the end, falling evenly; without it, the same.",
+        "Learning",
+        kind=float,
+        least=0,
+        most=1,
+    )
+    target_sync_updates: int = option(
+        250, "Updates (not steps) between copies to the target network.", "Learning", least=1
+    )
+    reduction: Literal["sum", "mean"] = option(
         "sum", "Over components: sum, or the paper's mean.", "Learning"
     )
-    double: bool = _option(False, "Double DQN: the online network chooses.", "Learning")
-    bf16: bool = _option(False, "Compute in bfloat16: quicker, less exact.", "Learning")
-    hidden: tuple[int, ...] = _option(
-        (128, 128), "Layers of the MLP, for vectors.", "Learning", kind=int, metavar="SIZE,SIZE"
+    loss: Literal["squared", "huber"] = option(
+        "squared",
+        "squared learns averages; huber minds rare large errors less, as most DQNs do.",
+        "Learning",
     )
-    weights: str | None = _option(
+    max_grad_norm: float | None = option(
+        None,
+        "Cut longer gradients to this length; without it, they are left.",
+        "Learning",
+        kind=float,
+    )
+    double: bool = option(False, "Double DQN: the online network chooses.", "Learning")
+    precision: Literal["auto", "float32", "bfloat16"] = option(
+        "float32",
+        "float32; bfloat16, less exact and often quicker; or auto: the quicker one here.",
+        "Learning",
+    )
+    hidden: tuple[int, ...] = option(
+        (128, 128),
+        "Layers of the MLP, for vectors.",
+        "Learning",
+        kind=int,
+        metavar="SIZE,SIZE",
+        least=1,
+        most=1_000_000,
+    )
+    weights: str | None = option(
         None,
         "Begin with these weights instead of random ones.",
         "Learning",
         kind=str,
         metavar="FILE",
     )
-    capacity: int = _option(100_000, "Transitions that the replay memory holds.", "Learning")
-    clip_rewards: bool = _option(False, "Learn from the sign of each reward.", "Reward and ending")
-    life_loss_ends: bool = _option(
+    capacity: int = option(
+        100_000, "Transitions that the replay memory holds.", "Learning", least=1
+    )
+    clip_rewards: bool = option(False, "Learn from the sign of each reward.", "Reward and ending")
+    life_loss_ends: bool = option(
         False, "Learn as if a lost life ended the episode.", "Reward and ending"
     )
-    evaluate_episodes: int = _option(30, "Episodes of the final evaluation; 0: none.", "Evaluation")
-    evaluate_epsilon: float = _option(0.0, "Chance of a random action in it.", "Evaluation")
-    checkpoint_every: int = _option(20_000, "Agent steps between two checkpoints.", "Running")
-    log_every: int = _option(1_000, "Agent steps between two lines of metrics.", "Running")
-    tensorboard: bool = _option(False, "Write metrics for TensorBoard, too.", "Running")
-    device: str = _option("auto", "cpu, cuda, mps, or auto: what is there.", "Running")
-    threads: int = _option(0, "Of PyTorch on the CPU; 0: what suits the network.", "Running")
+    evaluate_episodes: int = option(
+        30, "Episodes of the final evaluation; 0: none.", "Evaluation", least=0, most=100_000
+    )
+    evaluate_epsilon: float = option(
+        0.0, "Chance of a random action in it.", "Evaluation", least=0, most=1
+    )
+    checkpoint_every: int = option(
+        20_000, "Agent steps between two checkpoints.", "Running", least=1
+    )
+    log_every: int = option(1_000, "Agent steps between two lines of metrics.", "Running", least=1)
+    tensorboard: bool = option(False, "Write metrics for TensorBoard, too.", "Running")
+    device: str = option("auto", "cpu, cuda, mps, or auto: what is there.", "Running")
+    threads: int = option(
+        0, "Of PyTorch on the CPU; 0: what suits the network.", "Running", least=0
+    )
 
     def __post_init__(self) -> None:
-        for name in _POSITIVE:
-            _require(getattr(self, name) >= 1, name, getattr(self, name), "1 or more")
-        for name in _NOT_NEGATIVE:
-            _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
-        for name in ("epsilon_start", "epsilon_end", "evaluate_epsilon"):
-            _require(0 <= getattr(self, name) <= 1, name, getattr(self, name), "from 0 to 1")
-        _require(self.seed < 2**63, "seed", self.seed, "less than 2**63")
-        end = self.learning_rate_end
-        _require(end is None or 0 <= end < float("inf"), "learning_rate_end", end, "0 or more")
-        _require(all(size >= 1 for size in self.hidden), "hidden", self.hidden, "sizes above 0")
+        for of in fields(self):
+            check_range(of, getattr(self, of.name))
         self.time_axis  # noqa: B018  checks γ, N and w
         self.update_settings  # noqa: B018  checks the rest
-        if self.learning_starts < self.width * self.num_envs:
+        self._check_together()
+
+    def _check_together(self) -> None:
+        names = self.action_names
+        if len(set(names)) < len(names) or not all(name.strip() for name in names):
             raise InputError(
-                f"`learning_starts` is {self.learning_starts}: not one window of w = {self.width} "
-                f"steps is full by then.",
-                f"Choose {self.width * self.num_envs} or more.",
+                f"The action names are {', '.join(map(repr, names))}.",
+                "Each has a name of its own.",
+            )
+        windows = self.width * self.num_envs
+        if self.learning_starts < windows:
+            raise InputError(
+                f"`learning_starts` is {self.learning_starts}: not one window of "
+                f"w = {self.width} steps is full by then.",
+                f"Choose {windows} or more.",
+            )
+        if self.batch_size > self.capacity:
+            raise InputError(
+                f"A batch of {self.batch_size} windows is larger than a replay memory of "
+                f"{self.capacity} transitions.",
+                "Choose a smaller `batch_size` or a larger `capacity`.",
             )
 
     @property
@@ -171,8 +223,10 @@ class TrainSettings:
 
     @property
     def update_settings(self) -> UpdateSettings:
-        """What an update is told."""
-        return UpdateSettings(**{f.name: getattr(self, f.name) for f in fields(UpdateSettings)})
+        """What an update is told; in float32 as long as the precision is `auto`."""
+        told = {of.name: getattr(self, of.name) for of in fields(UpdateSettings)}
+        exact = {"precision": "float32"} if self.precision == "auto" else {}
+        return UpdateSettings(**told | exact)
 
     def epsilon(self, agent_steps: int) -> float:
         """Returns the chance of a random action after so many agent steps."""
@@ -235,45 +289,12 @@ def checked(config: Mapping[str, Any], where: str) -> dict[str, Any]:
             raise InputError(f"{where} has an unknown key '{key}'.", closest(key, names))
         of = options[names[key]]
         listed = isinstance(of.default, tuple)
-        given[of.name] = _typed(value, of.metadata.get("kind", str), listed, key, where)
+        given[of.name] = typed(value, of.metadata.get("kind", str), listed, key, where)
     if given.get("kind", "gym") not in get_args(Kind):
         raise InputError(f"{where} has kind = '{given['kind']}'.", "Use 'gym' or 'atari'.")
     return given
 
 
-def _typed(value: Any, kind: type, listed: bool, key: str, where: str) -> Any:
-    """Returns a value of a configuration as the type of the option."""
-    values = value if listed and isinstance(value, list | tuple) else [value]
-    if isinstance(value, list | tuple) != listed or not all(_fits(of, kind) for of in values):
-        wanted = f"a list of {_PLURAL[kind]}" if listed else _SINGULAR[kind]
-        raise InputError(f"{where} has {key} = {value!r}.", f"It must be {wanted}.")
-    return tuple(kind(of) for of in values) if listed else kind(value)
-
-
-def _fits(value: Any, kind: type) -> bool:
-    """Returns whether a value is of a type; whole numbers may be written like 1e6."""
-    if kind in (bool, str):
-        return isinstance(value, kind)
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and (kind is float or value % 1 == 0)
-
-
 def _names() -> dict[str, str]:
     """Returns the name of the field of each key of a configuration."""
     return {f.metadata.get("key") or f.name: f.name for f in fields(TrainSettings)}
-
-
-_POSITIVE = (
-    "agent_steps", "num_envs", "update_every", "batch_size", "capacity", "learning_starts",
-    "checkpoint_every", "log_every",
-)  # fmt: skip
-_NOT_NEGATIVE = ("seed", "epsilon_steps", "evaluate_episodes", "threads")
-
-
-_SINGULAR = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
-_PLURAL = {int: "whole numbers", str: "texts"}
-
-
-def _require(holds: bool, name: str, value: object, range_: str) -> None:
-    if not holds:
-        raise InputError(f"`{name}` is {value}.", f"It must be {range_}.")

@@ -19,8 +19,9 @@ from trdlab.deep.scores import Scores
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.update import Learner, load_weights
 from trdlab.environments import Environments, NotReproducible, Step
+from trdlab.environments.faults import blamed, check_finite
+from trdlab.environments.protocol import Frames
 from trdlab.environments.stack import FrameStack, observation_space
-from trdlab.errors import TrdlabError
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,7 @@ class Trainer:
 
     Raises:
         InputError: there is no network for what the environments show.
+        EnvironmentFault: they fail, or show what is no number.
     """
 
     def __init__(self, settings: TrainSettings, environments: Environments) -> None:
@@ -83,7 +85,7 @@ class Trainer:
             padding=environments.padding,
             time_limit=environments.time_limit,
         )
-        self.stack = FrameStack(environments.reset(), environments.stack, environments.padding)
+        self.stack = FrameStack(self._reset(), environments.stack, environments.padding)
         self.scores = Scores(environments.num_envs)
         self.agent_steps = 0
         self._losses, self._values, self._updates_told = 0.0, 0.0, 0
@@ -106,12 +108,14 @@ class Trainer:
         """Acts once in every environment, remembers it, and makes the updates that are due.
 
         Raises:
-            TrdlabError: a reward, an observation or the loss is not finite. Nothing was remembered
-                or learned of it, but the trainer cannot go on.
+            EnvironmentFault: an environment fails, or gives a reward or an observation that is no
+                number. Nothing was remembered or learned of it, but the trainer cannot go on.
+            TrdlabError: the loss is not finite; likewise.
         """
         frames, actions = self.stack.newest.copy(), self._choose()
-        step = self.environments.step(actions)
-        _check_finite(step, self.agent_steps)
+        with blamed(f"at agent step {self.agent_steps + 1}"):
+            step = self.environments.step(actions)
+        _check_step(step, f"after {self.agent_steps} agent steps")
         self._remember(frames, actions, step)
         self.scores.add(step)
         self.stack.push(step.following, step.ended)
@@ -134,6 +138,13 @@ class Trainer:
         )
         self._losses, self._values, self._updates_told = 0.0, 0.0, told.updates
         return told
+
+    def _reset(self) -> Frames:
+        """Begins an episode in every environment; returns their first frames `[B, ...]`."""
+        with blamed("when it was reset"):
+            frames = self.environments.reset()
+        check_finite("observation", frames, "when it was reset")
+        return frames
 
     def _choose(self) -> IntArray:
         """Returns the actions `[B]`: at random with probability ε, else the greedy ones."""
@@ -200,6 +211,7 @@ class Trainer:
 
         Raises:
             InputError: the state is of a run with other settings.
+            EnvironmentFault: an environment fails.
         """
         progress = state["progress"]
         self.agent_steps = progress["agent_steps"]
@@ -210,26 +222,22 @@ class Trainer:
         self.learner.load_state_dict(state["learner"])
         self.memory.load_state_dict(state["memory"])
         try:
-            self.environments.load_state_dict(state["environments"])
+            with blamed("when its episodes were played again"):
+                self.environments.load_state_dict(state["environments"])
         except NotReproducible as problem:
             self.memory.interrupt()
             self.scores.drop()
-            self.stack.begin(self.environments.reset(), _all(self.environments.num_envs))
+            self.stack.begin(self._reset(), _all(self.environments.num_envs))
             return problem
         self.stack.frames[...] = state["stack"]
         return None
 
 
-def _check_finite(step: Step, agent_steps: int) -> None:
-    """Refuses what would spoil the network now, or later out of the memory."""
-    for name, values in (("reward", step.rewards), ("observation", step.frames)):
-        finite = np.isfinite(values)
-        if not finite.all():
-            raise TrdlabError(
-                f"The environment gave the {name} {values[~finite][0]} after {agent_steps} agent "
-                "steps. Nothing was learned from it.",
-                "Correct the environment; earlier checkpoints hold nothing of it.",
-            )
+def _check_step(step: Step, when: str) -> None:
+    """Refuses what is no number: in what a step led to, and in the next episode's beginning."""
+    check_finite("reward", step.rewards, when)
+    check_finite("observation", step.frames, when)
+    check_finite("observation", step.following[step.ended], when)
 
 
 def _all(num_envs: int) -> BoolArray:

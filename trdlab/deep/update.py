@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from trdlab.deep.loss import finite_loss, of_actions, td_loss, trd_target
 from trdlab.deep.networks import DecompositionNetwork
@@ -114,11 +114,13 @@ class Learner:
             selected_by=chooser,
         )  # [B, N+1]
         components = self._components(self.q_network, observations)  # [B, A, N+1]
-        loss = td_loss(components, actions, target, settings.reduction)  # scalar
+        loss = td_loss(components, actions, target, settings.reduction, settings.loss)
         number = finite_loss(loss, self.num_updates + 1)
 
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
+        if settings.max_grad_norm is not None:
+            nn.utils.clip_grad_norm_(self.q_network.parameters(), settings.max_grad_norm)
         self.optimizer.step()
 
         self.num_updates += 1
@@ -182,7 +184,8 @@ class Learner:
         A context of its own for each call: autocast caches the weights it has cast, and those of a
         call without gradients must not serve one with.
         """
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.settings.bf16):
+        reduced = self.settings.precision == "bfloat16"
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=reduced):
             components: Tensor = network(observations)
         return components.float()
 

@@ -1,7 +1,7 @@
 """What an agent sees and can do in its environments, described and compared in one place."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import gymnasium as gym
@@ -21,6 +21,7 @@ class Interface:
         space: of what is seen: a frame, or a stack `[k, ...]` of them.
         action_names: A names; where there are none, the numbers that the environment gives them.
         first_action: what the environment itself calls action 0.
+        seconds_per_step: how long a step takes as people play, if that is known.
 
     >>> lake = Interface(gym.spaces.Discrete(16), ("left", "down", "right", "up"))
     >>> lake.seen, lake.done
@@ -32,12 +33,19 @@ class Interface:
     space: gym.spaces.Space[Any]
     action_names: tuple[str, ...]
     first_action: int = 0
+    seconds_per_step: float | None = None
 
     @classmethod
     def of(cls, environments: Environments) -> Self:
         """Returns what is seen and can be done in environments."""
         names = environments.action_names or numbered(environments.num_actions)
-        return cls(observation_space(environments), tuple(names), environments.first_action)
+        rate = environments.frames_per_second
+        return cls(
+            observation_space(environments),
+            tuple(names),
+            environments.first_action,
+            environments.frame_skip / rate if rate else None,
+        )
 
     @property
     def seen(self) -> str:
@@ -66,6 +74,24 @@ class Interface:
         if named and self.action_names != other.action_names:
             return self.done, other.done
         return None
+
+    def named(self, action_names: Sequence[str]) -> "Interface":
+        """Returns the same, its actions called as people say.
+
+        Args:
+            action_names: A names.
+
+        Raises:
+            InputError: there are more or fewer.
+        """
+        count = len(self.action_names)
+        if len(action_names) != count:
+            raise InputError(
+                f"There are {len(action_names)} names for {count} actions: "
+                f"{', '.join(action_names)}.",
+                "Give one for each action.",
+            )
+        return replace(self, action_names=tuple(action_names))
 
     def check_fits(self, there: "Interface", name: str) -> None:
         """Checks that an agent which knows this sees and does the same in other environments.

@@ -19,7 +19,7 @@ class Seen:
     Args:
         range: `[2, N+2]`, the least and the most that ever came of every component, and of all
             together.
-        chance: whether copies of a state ever went differently; None where none were made.
+        chance: whether a state ever led to different things; None where that was not looked at.
     """
 
     range: FloatArray
@@ -86,7 +86,7 @@ def compared(
     one, other = (_futures(branches, whole) for branches in tried)  # [n, N+2]
     said = np.stack([_with_sum(branches.predicted[0], whole) for branches in tried])  # [2, N+2]
     same = not any(np.nan_to_num(np.ptp(of, axis=0)).any() for of in (one, other))
-    chance = None if seen is None else seen.chance
+    chance = any(branches.shared_chance for branches in tried) or (seen and seen.chance)
     if same and (chance is False or (chance is None and np.nan_to_num(one + other).any())):
         value = one.mean(axis=0) - other.mean(axis=0)
         observed = Estimates(value, value, value)

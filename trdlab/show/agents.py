@@ -1,6 +1,7 @@
 """What is rendered of agents: explanations, calibrations and comparisons, as pages and as data."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,15 @@ from trdlab.explanations.calibration import claims as calibration
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison import claims as comparing
 from trdlab.explanations.comparison.comparison import SIDES, Comparison
+from trdlab.explanations.episode.played import Played
 from trdlab.explanations.explanation import Explanation
 from trdlab.explanations.rules import plain_data
+from trdlab.explanations.words import counted
 from trdlab.formatting import decimals_for, number
-from trdlab.show.data import actions_data, axis_data, data, sections_data
+from trdlab.show.data import actions_data, axis_data, data, told_data
 from trdlab.show.document import Document, axis_words, document
 from trdlab.show.scenes import scene_of
+from trdlab.show.tables import Row, Table, action_table
 from trdlab.statistics import Estimate, Estimates
 
 _MOST_ROWS = 8  # of a table of components
@@ -23,22 +27,16 @@ _MOST_ROWS = 8  # of a table of components
 
 @document.register
 def _(explanation: Explanation) -> Document:
-    agent, choice = explanation.agent, explanation.choice
+    agent, choice, state = explanation.agent, explanation.choice, explanation.state
+    seed = f"the episode with seed {explanation.seed}"
     heading = [agent.name]
-    if choice is not None:
-        heading.append(f"step {explanation.step} of the episode with seed {explanation.seed}")
-    elif explanation.story is not None:
-        heading.append(f"the episode with seed {explanation.seed}")
-    drawing, legend = "", tuple[str, ...]()
-    if explanation.state is not None and agent.world is not None:
-        scene = scene_of(agent.world, explanation.state)
-        drawing, legend = scene.drawing, scene.legend
+    if choice is not None or explanation.story is not None:
+        heading.append(seed if choice is None else f"step {explanation.step} of {seed}")
     return Document(
         heading=" · ".join(heading),
         setting=(*axis_words(explanation.time_axis), *_played(explanation)),
-        drawing=drawing,
-        legend=legend,
-        choice=choice,
+        scene=None if state is None or agent.world is None else scene_of(agent.world, state),
+        table=_shown(explanation),
         answer=tuple(claim.sentence for claim in explanation.answer),
         sections=explanation.sections,
         folded=not explanation.parts,
@@ -47,26 +45,32 @@ def _(explanation: Explanation) -> Document:
 
 @document.register
 def _(report: CalibrationReport) -> Document:
-    told = calibration.in_brief(report)
     return Document(
         heading=f"How far its forecasts can be trusted · {report.judged.episodes} episodes",
         setting=axis_words(report.time_axis),
-        answer=tuple(claim.sentence for claim in told),
+        answer=tuple(claim.sentence for claim in calibration.in_brief(report)),
         sections=calibration.sections(report),
     )
 
 
 @document.register
 def _(comparison: Comparison) -> Document:
-    named = zip(SIDES, comparison.names, strict=True)
-    seconds = comparison.seconds_per_step
+    axis, seconds = axis_words(comparison.time_axis), _seconds(comparison.seconds_per_step)
     return Document(
-        heading=" · ".join(f"{side}: {name}" for side, name in named),
-        setting=(*axis_words(comparison.time_axis), *_seconds(seconds)),
-        grid=_means(comparison),
+        heading=" · ".join(comparison.titles),
+        setting=(*axis, *_where(comparison), *seconds),
+        table=_means(comparison) if comparison.visits.apart.any() else None,
         answer=tuple(claim.sentence for claim in comparing.in_brief(comparison)),
         sections=comparing.sections(comparison),
     )
+
+
+def _shown(explanation: Explanation) -> Table | None:
+    """Returns the actions shown; the difference of two only to who asks for a contrast."""
+    choice, parts = explanation.choice, explanation.parts
+    if choice is None:
+        return None
+    return action_table(choice if not parts or "contrast" in parts else replace(choice, foil=None))
 
 
 def _played(explanation: Explanation) -> list[str]:
@@ -78,30 +82,37 @@ def _played(explanation: Explanation) -> list[str]:
         cut.add(story.played.episode.time_limit)
     words = _seconds(explanation.agent.seconds_per_step)
     if explanation.max_steps in cut - {None}:
-        words.append(f"episodes are cut off after {explanation.max_steps:,} steps")
+        words.append(f"episodes are cut off after {counted(explanation.max_steps or 0, 'step')}")
     return words
+
+
+def _where(comparison: Comparison) -> list[str]:
+    """Returns where both act, if that has a name."""
+    env, *arguments = comparison.place[1::2] or ("",)
+    made = f" with {', '.join(arguments)}" if arguments else ""
+    return [f"both act in {env}{made}"] if env else []
 
 
 def _seconds(seconds: float | None) -> list[str]:
     return [] if seconds is None else [f"a step is {seconds:.2g} s of play"]
 
 
-def _means(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
+def _means(comparison: Comparison) -> Table:
     """Returns what each of two agents expects of what it would do, by component, and in all."""
     means, gap, axis = comparison.means.value, comparison.difference, comparison.time_axis
     decimals = decimals_for([*means.ravel(), *gap.value])
     has_intervals = not math.isnan(comparison.gap.low)
 
-    def row(label: str, values: FloatArray, estimate: Estimate) -> tuple[str, ...]:
+    def row(label: str, values: FloatArray, estimate: Estimate) -> Row:
         ends = " to ".join(number(end, decimals) for end in (estimate.low, estimate.high))
         cells = (number(float(x), decimals) for x in (*values, estimate.value))
-        return label, *cells, *([ends] if has_intervals else [])
+        return label, *cells, *[ends] * has_intervals
 
-    shown = np.argsort(-comparison.apart.value, kind="stable")[:_MOST_ROWS]
-    parts = [row(axis.label(c), means[:, c], gap[c]) for c in sorted(shown.tolist())]
-    heading = ("reward at", *SIDES, "B − A", *(["95 % interval"] if has_intervals else []))
-    in_all = row("all of it", means.sum(axis=1), comparison.gap)
-    return heading, *(parts if axis.horizon else ()), in_all
+    shown = np.argsort(-comparison.apart.value, kind="stable")[:_MOST_ROWS] if axis.horizon else ()
+    rows = [row(axis.label(c), means[:, c], gap[c]) for c in sorted(map(int, shown))]
+    rows.append(row("all of it", means.sum(axis=1), comparison.gap))
+    heading = ("reward at", *SIDES, "B − A", *["95 % interval"] * has_intervals)
+    return Table(heading, tuple(rows), "<" + ">" * len(heading[1:]))
 
 
 # ---- as plain data -----------------------------------------------------------------------------
@@ -109,18 +120,7 @@ def _means(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
 
 @data.register
 def _(explanation: Explanation) -> dict[str, Any]:
-    choice, report, trial = explanation.choice, explanation.report, explanation.trial
-    moment = None
-    if choice is not None:
-        moment = {
-            "state": explanation.state,
-            "actions": actions_data(choice.moment),
-            "error": plain_data(choice.moment.error),
-            "foil_error": plain_data(choice.moment.foil_error),
-            "only_reward": plain_data(choice.moment.only_reward),
-            "action": choice.action,
-            "foil": choice.foil,
-        }
+    report, trial, story = explanation.report, explanation.trial, explanation.story
     return {
         "schema": "trdlab.explain/2",
         "agent": explanation.agent.name,
@@ -130,11 +130,10 @@ def _(explanation: Explanation) -> dict[str, Any]:
         "max_steps": explanation.max_steps,
         "time_axis": axis_data(explanation.time_axis),
         "future": explanation.agent.estimator.future.to_dict(),
-        "answer": [claim.to_dict() for claim in explanation.answer],
-        "sections": sections_data(explanation.sections),
-        "moment": moment,
+        **told_data(explanation.answer, explanation.sections),
+        "moment": _moment(explanation),
         "trial": None if trial is None else trial.to_dict(),
-        "episode": None if explanation.story is None else _episode(explanation),
+        "episode": None if story is None else _episode(story.played, explanation.seed),
         "calibration": None if report is None else data(report),
     }
 
@@ -145,17 +144,20 @@ data.register(CalibrationReport, calibration.to_dict)
 @data.register
 def _(comparison: Comparison) -> dict[str, Any]:
     visits = comparison.visits
+    found = ("difference", "apart", "of_any_action", "gap", "shift", "agreement")
     return {
         "schema": "trdlab.compare/2",
         "agents": {
             side: {
                 "name": comparison.names[i],
+                "words": list(comparison.words[i]),
                 "future": comparison.futures[i].to_dict(),
                 "mean": plain_data(_of_side(comparison.means, i)),
                 "calibration": None if report is None else data(report),
             }
             for i, (side, report) in enumerate(zip(SIDES, comparison.reports, strict=True))
         },
+        "place": list(comparison.place),
         "seconds_per_step": comparison.seconds_per_step,
         "max_steps": comparison.max_steps,
         "time_axis": axis_data(comparison.time_axis),
@@ -163,14 +165,9 @@ def _(comparison: Comparison) -> dict[str, Any]:
         "different_episodes": visits.different,
         "cut_off": visits.cut,
         "states": len(visits),
-        "difference": plain_data(comparison.difference),
-        "apart": plain_data(comparison.apart),
-        "of_any_action": plain_data(comparison.of_any_action),
-        "gap": plain_data(comparison.gap),
-        "shift": plain_data(comparison.shift),
-        "agreement": plain_data(comparison.agreement),
-        "answer": [claim.to_dict() for claim in comparing.in_brief(comparison)],
-        "sections": sections_data(comparing.sections(comparison)),
+        **{name: plain_data(getattr(comparison, name)) for name in found},
+        "furthest": [_state(comparison, m) for m in visits.furthest(comparing.FURTHEST)],
+        **told_data(comparing.in_brief(comparison), comparing.sections(comparison)),
     }
 
 
@@ -178,19 +175,47 @@ def _of_side(means: Estimates, side: int) -> Estimates:
     return Estimates(means.value[side], means.low[side], means.high[side])
 
 
-def _episode(explanation: Explanation) -> dict[str, Any]:
+def _state(comparison: Comparison, m: int) -> dict[str, Any]:
+    """Returns a state, and what each of the two would do there and expects of that."""
+    visits, names = comparison.visits, comparison.action_names
+    told = {
+        side: {"action": names[visits.actions[i, m]], "components": visits.expected[i, m].tolist()}
+        for i, side in enumerate(SIDES)
+    }
+    return {
+        "player": SIDES[visits.player[m]],
+        "seed": int(visits.seed[m]),
+        "step": int(visits.step[m]),
+        "distance": float(visits.apart[m]),
+        **told,
+    }
+
+
+def _moment(explanation: Explanation) -> dict[str, Any] | None:
+    choice = explanation.choice
+    if choice is None:
+        return None
+    known = ("error", "foil_error", "only_reward")
+    return {
+        "state": explanation.state,
+        "actions": actions_data(choice.moment),
+        **{name: plain_data(getattr(choice.moment, name)) for name in known},
+        "action": choice.action,
+        "foil": choice.foil,
+    }
+
+
+def _episode(played: Played, seed: int) -> dict[str, Any]:
     """Returns the numbers of an episode.
 
     `values` is `[T]`, what was expected in all of the actions taken. `td_errors` is `[T]` too, by
     how much more each step turned out to bring; `null` where a truncation hides it.
     """
-    assert explanation.story is not None
-    played = explanation.story.played
     episode, revision = played.episode, played.revision
     errors = np.full(len(episode), np.nan)
     errors[revision.steps] = revision.change.sum(axis=1)
     return {
-        "seed": explanation.seed,
+        "seed": seed,
         "steps": len(episode),
         "terminated": episode.terminated,
         "actions": [played.action(step) for step in range(len(episode))],

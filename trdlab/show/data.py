@@ -1,12 +1,13 @@
 """Nouns as plain data at full precision, for JSON; `null` stands for what is not known."""
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from functools import singledispatch
 from typing import Any
 
 from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.telling import in_brief, sections
-from trdlab.explanations.rules import plain_data
+from trdlab.explanations.rules import Claim, plain_data
 from trdlab.explanations.sections import Section
 from trdlab.explanations.solved import SolvedState
 from trdlab.show.document import late
@@ -28,7 +29,6 @@ def data(thing: Any) -> dict[str, Any]:
 def _(solved: SolvedState) -> dict[str, Any]:
     scene, choice = scene_of(solved.world, solved.state), solved.choice
     return {
-        "schema": scene.schema,
         **scene.world,
         "time_axis": axis_data(solved.table.time_axis),
         "future": choice.moment.future.to_dict(),
@@ -36,8 +36,7 @@ def _(solved: SolvedState) -> dict[str, Any]:
         "actions": actions_data(choice.moment),
         "action": choice.action,
         "foil": choice.foil,
-        "answer": [claim.to_dict() for claim in in_brief(choice)],
-        "sections": sections_data(sections(choice)),
+        **told_data(in_brief(choice), sections(choice)),
         "checks": {"sum_error": solved.sum_error, "error_bound": solved.error_bound},
     }
 
@@ -47,32 +46,27 @@ def axis_data(axis: TimeAxis) -> dict[str, Any]:
     return {**asdict(axis), "labels": axis.labels}
 
 
-def sections_data(told: tuple[Section, ...]) -> list[dict[str, Any]]:
-    """Returns what is told, in its sections."""
-    return [section.to_dict() for section in told]
+def told_data(answer: Iterable[Claim], told: Iterable[Section]) -> dict[str, Any]:
+    """Returns the few sentences that matter most, and all that there is to tell."""
+    return {
+        "answer": [claim.to_dict() for claim in answer],
+        "sections": [section.to_dict() for section in told],
+    }
 
 
 def actions_data(moment: Moment) -> dict[str, Any]:
     """Returns what is known of each action."""
-    return {
-        name: {
-            "components": moment.components(name).tolist(),
-            "q_value": moment.q_value(name),
-            "undiscounted_total": plain_data(moment.total(name)),
-            "probability": None if moment.policy is None else float(moment.policy[i]),
-            "stays": None if moment.stays is None else moment.stays[i],
-            **_uncertainty(moment, i),
-        }
-        for i, name in enumerate(moment.action_names)
-    }
+    return {name: _action(moment, i, name) for i, name in enumerate(moment.action_names)}
 
 
-def _uncertainty(moment: Moment, action: int) -> dict[str, Any]:
+def _action(moment: Moment, i: int, name: str) -> dict[str, Any]:
     known = moment.uncertainty
-    if known is None:
-        return {}
+    spread = ("deviation", "return_deviation", "survival") if known is not None else ()
     return {
-        "deviation": known.deviation[action].tolist(),
-        "return_deviation": float(known.return_deviation[action]),
-        "survival": known.survival[action].tolist(),
+        "components": moment.components(name).tolist(),
+        "q_value": moment.q_value(name),
+        "undiscounted_total": plain_data(moment.total(name)),
+        "probability": None if moment.policy is None else float(moment.policy[i]),
+        "stays": None if moment.stays is None else moment.stays[i],
+        **{of: getattr(known, of)[i].tolist() for of in spread},
     }

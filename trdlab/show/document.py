@@ -6,12 +6,12 @@ from functools import singledispatch
 from importlib import import_module
 from typing import Any, TypeVar
 
-from trdlab.explanations.moment.moment import Choice
 from trdlab.explanations.moment.telling import in_brief, sections
 from trdlab.explanations.sections import Section
 from trdlab.explanations.solved import SolvedState
 from trdlab.formatting import plain
-from trdlab.show.scenes import scene_of
+from trdlab.show.scenes import Scene, scene_of
+from trdlab.show.tables import Table, action_table
 from trdlab.time_axis import TimeAxis
 
 T = TypeVar("T")
@@ -26,11 +26,8 @@ class Document:
     Args:
         heading: whom or what it is about.
         setting: what else decides the numbers, in short pieces.
-        drawing: the world as text, where it can be drawn.
-        legend: what its symbols mean.
-        notes: what the numbers leave out.
-        choice: whose actions are shown as a table.
-        grid: another table: its heading, and its rows.
+        scene: where it is.
+        table: the numbers.
         answer: the few sentences that matter most.
         sections: all that there is to tell.
         check: what was checked of the numbers, and whether it is well.
@@ -38,12 +35,9 @@ class Document:
     """
 
     heading: str
-    setting: tuple[str, ...] = ()
-    drawing: str = ""
-    legend: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    choice: Choice | None = None
-    grid: tuple[tuple[str, ...], ...] = ()
+    setting: tuple[str, ...]
+    scene: Scene | None = None
+    table: Table | None = None
     answer: tuple[str, ...] = ()
     sections: tuple[Section, ...] = ()
     check: tuple[str, bool] | None = None
@@ -82,10 +76,8 @@ def _(solved: SolvedState) -> Document:
     return Document(
         heading=scene.heading,
         setting=(*axis_words(choice.time_axis), here, *scene.rules),
-        drawing=scene.drawing,
-        legend=scene.legend,
-        notes=scene.notes,
-        choice=choice,
+        scene=scene,
+        table=action_table(choice),
         answer=tuple(claim.sentence for claim in in_brief(choice)),
         sections=sections(choice),
         check=_check(solved),

@@ -6,9 +6,9 @@ from functools import singledispatch
 from typing import Any
 
 from trdlab.environments.arguments import say_arguments
-from trdlab.formatting import amount, plain
+from trdlab.formatting import plain
 from trdlab.gridworld import Gridworld
-from trdlab.gridworld.ansi import DRONE, ansi
+from trdlab.gridworld.ansi import ansi, legend
 from trdlab.tabular.named import TabularWorld
 
 _LIMIT = "The environment cuts episodes off after {} steps; the model does not."
@@ -20,7 +20,6 @@ class Scene:
     """What stands around the numbers: which world and state this is.
 
     Args:
-        schema: the name and version of the JSON object.
         heading: the first line.
         caption: the title of the picture.
         place: the state in words, empty where it has only a number.
@@ -28,11 +27,10 @@ class Scene:
         drawing: the map as text, empty where there is none.
         legend: what its symbols mean.
         notes: what the numbers leave out.
-        world: what the JSON object says of the world.
+        world: what JSON says of the world, and in which schema.
         state: what it says of the state, besides its index.
     """
 
-    schema: str
     heading: str
     caption: str
     place: str
@@ -55,23 +53,17 @@ def _(world: Gridworld, state: int) -> Scene:
     grid, here = world.grid, world.states[state]
     rules = [f"slip {plain(grid.slip)}"] * bool(grid.slip)
     rules += [f"each step costs {plain(grid.step_cost)}"] * bool(grid.step_cost)
+    told = {name: getattr(grid, name) for name in ("name", "title", "rows", "slip", "step_cost")}
     return Scene(
-        schema="trdlab.gridworld/2",
         heading=f"{grid.name} · {grid.title}" if grid.title else grid.name,
         caption=grid.title or grid.name,
         place=str(here),
         rules=tuple(rules),
         drawing=ansi(world, state),
-        legend=tuple(_legend(world)),
+        legend=legend(world),
         world={
-            "map": {
-                "name": grid.name,
-                "title": grid.title,
-                "rows": list(grid.rows),
-                "slip": grid.slip,
-                "step_cost": grid.step_cost,
-                "num_states": len(world.states),
-            }
+            "schema": "trdlab.gridworld/2",
+            "map": {**told, "num_states": len(world.states)},
         },
         state={
             "row": here.row,
@@ -83,58 +75,37 @@ def _(world: Gridworld, state: int) -> Scene:
 
 @scene_of.register
 def _(world: TabularWorld, state: int) -> Scene:
-    mdp = world.mdp
+    mdp, here = world.mdp, world.describe(state)
     told = {k: v for k, v in world.arguments.items() if isinstance(v, bool | str)}
     notes = [_NEVER] * (not world.visited[state] and not mdp.terminal_states[state])
     notes += [_LIMIT.format(world.time_limit)] * (world.time_limit is not None)
+    names = [coordinate.name for coordinate in world.coordinates]
     return Scene(
-        schema="trdlab.tabular/2",
         heading=f"{world.name} · {mdp.num_states} states, {mdp.num_actions} actions",
         caption=" · ".join(filter(None, (world.name, say_arguments(told)))),
-        place=world.describe(state),
+        place=here,
         rules=tuple(say_arguments({name: value}) for name, value in told.items()),
         drawing=world.draw(state),
-        legend=tuple(world.legend),
+        legend=world.legend,
         notes=tuple(notes),
         world={
+            "schema": "trdlab.tabular/2",
             "environment": {
                 "id": world.name,
                 "arguments": {k: v for k, v in world.arguments.items() if _is_plain(v)},
                 "num_states": mdp.num_states,
                 "time_limit": world.time_limit,
-            }
+            },
         },
         state={
-            "coordinates": dict(
-                zip((c.name for c in world.coordinates), world.place(state), strict=True)
-            ),
-            "description": world.describe(state),
+            "coordinates": dict(zip(names, world.place(state), strict=True)),
+            "description": here,
             "visited": bool(world.visited[state]),
         },
     )
 
 
-def _legend(world: Gridworld) -> list[str]:
-    """Returns what each symbol on the map means."""
-    grid = world.grid
-    entries = [f"{DRONE} the drone"]
-    for symbol in dict.fromkeys("".join(grid.rows)):
-        cell = grid.legend[symbol]
-        if symbol == "S" or cell.kind == "floor":
-            continue
-        words: list[str] = [cell.kind]
-        if cell.kind not in ("wall", "one-way"):
-            words += [f"{amount(cell.value)}"] * bool(cell.value)
-            words += ["each time"] * (cell.kind in ("hazard", "fountain") and not cell.terminal)
-            words += ["(ends)"] * cell.terminal
-        entries.append(f"{symbol} {' '.join(words)}")
-    if grid.wind is not None:
-        blows = world.action_names[grid.wind.direction]
-        entries.append(f"wind {blows}: {' '.join(map(str, grid.wind.strengths))}")
-    return entries
-
-
 def _is_plain(value: Any) -> bool:
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return isinstance(value, bool | int | str)
+    return isinstance(value, bool | int | str) or (
+        isinstance(value, float) and math.isfinite(value)
+    )

@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from trdlab.deep.settings import TrainSettings
@@ -11,11 +9,13 @@ from trdlab.errors import InputError
 from trdlab.formatting import decimals_for
 from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary, to_toml
-from trdlab.show.text import fit
+from trdlab.show.tables import Row, Table
+from trdlab.show.text import columns, table_lines, wrapped
+from trdlab.statistics import Estimate
 from trdlab.training.setup import Plan
 
 
-def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
+def plan_page(plan: Plan) -> Text:
     """Returns the resolved configuration, and the memory and time that it will take."""
     lines = [
         to_toml(plan.settings.to_config()),
@@ -25,28 +25,29 @@ def plan_page(plan: Plan, *, ascii_only: bool = False) -> RenderableType:
         f"second while learning (measured here, in a few seconds).",
         "Nothing was written: leave out --dry-run to train.",
     ]
-    return Text(fit("\n".join(lines), ascii_only=ascii_only))
+    return Text("\n".join(lines))
 
 
-def evaluation_page(evaluation: Evaluation, *, ascii_only: bool = False) -> RenderableType:
+def evaluation_page(evaluation: Evaluation, *, width: int | None = None) -> Text:
     """Returns what an agent reached: means with intervals, and how the episodes ended."""
-    count = len(evaluation.returns)
-    table = Table(box=None, padding=(0, 3, 0, 0), show_header=False, pad_edge=False)
     low, high = float(evaluation.returns.min()), float(evaluation.returns.max())
     decimals = _decimals(low, high)
-    for name, of in (
-        ("mean return", evaluation.mean),
-        ("interquartile mean", evaluation.interquartile_mean),
-    ):
+
+    def estimate(name: str, of: Estimate) -> Row:
         interval = f"95 % interval {_span(of.low, of.high, decimals)}"
-        table.add_row(name, _number(of.value, decimals), fit(interval, ascii_only=ascii_only))
-    span = _span(low, high, decimals)
-    table.add_row("least and most", fit(span, ascii_only=ascii_only), "")
-    length = f"{evaluation.lengths.mean():,.1f} agent steps"
-    table.add_row("mean length", length, _cut_off(evaluation))
+        return name, _number(of.value, decimals), interval
+
+    rows = (
+        estimate("mean return", evaluation.mean),
+        estimate("interquartile mean", evaluation.interquartile_mean),
+        ("least and most", _span(low, high, decimals), ""),
+        ("mean length", f"{evaluation.lengths.mean():,.1f} agent steps", _cut_off(evaluation)),
+    )
+    table, width = Table(("", "", ""), rows, "<<<"), width or columns()
     random = f", {evaluation.epsilon:.1%} random actions" if evaluation.epsilon else ""
-    head = f"{count} episodes, greedy{random}, seed {evaluation.seed}; raw rewards, undiscounted"
-    return Group(Text(fit(head, ascii_only=ascii_only)), table)
+    head = f"{len(evaluation.returns)} episodes, greedy{random}, seed {evaluation.seed}"
+    lines = wrapped(f"{head}; raw rewards, undiscounted", width)
+    return Text("\n").join([*lines, *table_lines(table, width)])
 
 
 def _cut_off(evaluation: Evaluation) -> str:
@@ -58,33 +59,32 @@ def _cut_off(evaluation: Evaluation) -> str:
     return f"{told} at step {limit:,}"
 
 
-def runs_table(runs: Sequence[RunSummary], *, ascii_only: bool = False) -> RenderableType:
-    """Returns a row for each run: what it learns, how far it is, and its score."""
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold", pad_edge=False)
-    for column in ("run", "environment", "N", "w", "steps", "score", "status"):
-        table.add_column(
-            column, justify="right" if column in ("N", "w", "steps", "score") else "left"
-        )
-    for run in runs:
-        cells = [fit(cell, ascii_only=ascii_only) for cell in _row(run)]
-        table.add_row(*map(Text, cells))
-    return table
+def runs_page(runs: Sequence[RunSummary], *, width: int | None = None) -> Text:
+    """Returns a row for each run: what it learns, how far it is, its score; then what is wrong."""
+    width = width or columns()
+    heading = ("run", "environment", "N", "w", "steps", "score", "status")
+    rows = [_row(run) for run in runs]
+    lines = table_lines(Table(heading, tuple(cells for cells, _ in rows), "<<>>>><"), width)
+    for (name, *_), fault in rows:
+        lines += [Text(), *wrapped(f"{name}: {fault}", width)] if fault else []
+    return Text("\n").join(lines)
 
 
-def _row(run: RunSummary) -> list[str]:
-    """Returns the cells of a run; of one that is torn, its name and what is wrong."""
+def _row(run: RunSummary) -> tuple[Row, str]:
+    """Returns the cells of a run, and what is wrong with it, if anything is."""
     name, fault = run.path.name, run.fault
     try:
         settings = None if fault else TrainSettings.from_config(run.config, "Its config.toml")
     except InputError as error:
         settings, fault = None, str(error)
     if settings is None:
-        return [name, "", "", "", "", "", fault or ""]
+        return (name, "", "", "", "", "", "cannot be read"), fault or ""
     score = run.metrics.get("score")
     steps = max(run.step or 0, run.metrics.get("agent_steps", 0))
-    axis = [str(settings.horizon), str(settings.width)]
     told = "" if score is None else _number(score, _decimals(score))
-    return [name, settings.env, *axis, f"{steps:,}", told, _status(run, settings.agent_steps)]
+    axis = (str(settings.horizon), str(settings.width))
+    status = _status(run, settings.agent_steps)
+    return (name, settings.env, *axis, f"{steps:,}", told, status), ""
 
 
 def _status(run: RunSummary, total: int) -> str:

@@ -1,8 +1,6 @@
 """The agent of a run: loaded as an Estimator, and evaluated."""
 
 from contextlib import suppress
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,16 +9,13 @@ from trdlab.deep.settings import TrainSettings
 from trdlab.environments import Environments, in_batches
 from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
-from trdlab.errors import OutputError, TrdlabError
+from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
-from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
+from trdlab.rollouts.playing import Watch, part_of, unwatched, usual_limit
 from trdlab.runs import RunFolder, read_arrays
-from trdlab.training.setup import (
-    future,
-    make_environments,
-    use_threads,
-)
+from trdlab.training.machine import use_threads
+from trdlab.training.setup import future, make_environments
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
@@ -120,9 +115,11 @@ def evaluate_run(
     settings = run_settings(folder)
     check_imported(settings.env)
     use_threads(settings)
+    chance = settings.evaluate_epsilon if epsilon is None else epsilon
+    if not 0.0 <= chance <= 1.0:  # nor is NaN
+        raise InputError(f"`epsilon` is {chance}.", "It lies from 0 to 1.")
     step, estimator = _loaded(folder, step)
     count = episodes or settings.evaluate_episodes or 30
-    chance = settings.evaluate_epsilon if epsilon is None else epsilon
     parts: list[Evaluation] = []
 
     def make(num_envs: int, seed: int) -> Environments:
@@ -137,18 +134,13 @@ def evaluate_run(
                 epsilon=chance,
                 seed=seed + len(parts),  # a single batch, where there can be one
                 max_steps=_limit(environments, max_steps, settings.time_axis),
-                watch=partial(_watch_all, watch, sum(len(of.returns) for of in parts), count),
+                watch=part_of(watch, sum(len(of.returns) for of in parts), count),
             )
         )
     result = joined(parts)
     limit = f"-max-steps-{max_steps}" if max_steps else ""
     name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}{limit}.json"
     return result, _keep(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
-
-
-def _watch_all(watch: Watch, before: int, count: int, now: Progress) -> None:
-    """Tells how far episodes are of which some have been played before these."""
-    watch(replace(now, finished=before + now.finished, episodes=count))
 
 
 def _limit(environments: Environments, given: int | None, axis: TimeAxis) -> int | None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from trdlab.deep.board import board, check_board
-from trdlab.deep.memory import check_memory
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
 from trdlab.deep.weights import read_weights
@@ -25,14 +24,8 @@ from trdlab.runs import (
 )
 from trdlab.runs.folder import check_free, is_run
 from trdlab.training.loading import interface_of, run_settings
-from trdlab.training.setup import (
-    default_path,
-    describe,
-    make_environments,
-    memory_of,
-    new_trainer,
-    resolved,
-)
+from trdlab.training.machine import check_threads, memory_of, resolved
+from trdlab.training.setup import default_path, describe, make_environments, new_trainer
 
 
 @dataclass(eq=False)
@@ -80,11 +73,12 @@ def begin(settings: TrainSettings, path: Path | None = None) -> Iterator[Run]:
     Raises:
         InputError: the environments cannot be made, or have no network.
         OutputError: the folder exists, or cannot be written.
-        TrdlabError: the replay memory does not fit into what is free.
+        TrdlabError: it does not fit into what is free.
     """
     with ExitStack() as stack:
         if path is not None:
             check_free(path)
+        check_threads(settings)
         trainer, memory = _trainer(settings, stack)
         folder = _new_folder(trainer, path)
         stack.enter_context(folder.held())
@@ -172,9 +166,8 @@ def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:
     check_board(wanted=settings.tensorboard)
     environments = make_environments(settings)
     stack.callback(environments.close)
-    memory = memory_of(settings, environments)
-    check_memory(memory, settings.capacity)
-    return new_trainer(resolved(settings, environments), environments), memory
+    settings = resolved(settings, environments)
+    return new_trainer(settings, environments), memory_of(settings, environments)
 
 
 def _new_folder(trainer: Trainer, path: Path | None) -> RunFolder:

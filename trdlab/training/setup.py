@@ -1,6 +1,5 @@
 """What a run is made of, from its settings: the environments, the device, the plan."""
 
-import os
 import re
 import time
 from collections.abc import Mapping
@@ -11,13 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trdlab.deep.presets import preset
-from trdlab.deep.settings import Kind, TrainSettings
+from trdlab.deep.settings import Kind, TrainSettings, checked
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.estimator import Future
+from trdlab.files import check_small_text
 from trdlab.runs import free_name, read_config
+from trdlab.training.machine import check_threads, memory_of, resolved, use_threads
 
 if TYPE_CHECKING:
     from trdlab.deep.trainer import Trainer
@@ -39,16 +40,18 @@ def read_settings(
     Raises:
         InputError: there is no such preset or file, or a key or value cannot be used.
     """
-    settings = preset(kind, env, preset_name)
+    base, in_file = preset(kind, env, preset_name), {}
     if config is not None:
+        check_small_text(config)
         lines = read_config(config)
         for key, here in (("kind", kind), ("env", env)):
             if lines.get(key, here) != here:
                 raise InputError(f"'{config}' is for another {key}.", f"Here it is '{here}'.")
-        complete = lines.keys() >= {"kind", "env"}
-        base = TrainSettings(kind, env) if complete else settings
-        settings = base.changed(lines, f"'{config}'")
-    return settings.changed(given, "The command")
+        if lines.keys() >= {"kind", "env"}:
+            base = TrainSettings(kind, env)
+        in_file = checked(lines, f"'{config}'")
+    # together, since one may only be in its range beside another
+    return replace(base, **{**in_file, **checked(given, "The command")})
 
 
 def default_path(settings: TrainSettings) -> Path:
@@ -69,8 +72,16 @@ def make_environments(
         seed: what their seeds are drawn from; by default that of the run.
 
     Raises:
-        InputError: they cannot be made.
+        InputError: they cannot be made, or have more or fewer actions than the settings name.
     """
+    environments = _made(settings, num_envs, seed)
+    if settings.action_names:
+        named = Interface.of(environments).named(settings.action_names)
+        environments.action_names = named.action_names
+    return environments
+
+
+def _made(settings: TrainSettings, num_envs: int | None, seed: int | None) -> Environments:
     arguments = parse_arguments(settings.env_arg)
     count = settings.num_envs if num_envs is None else num_envs
     seed = settings.seed if seed is None else seed
@@ -81,50 +92,6 @@ def make_environments(
     from trdlab.environments import GymEnvironments
 
     return GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments)
-
-
-def resolved(settings: TrainSettings, environments: Environments) -> TrainSettings:
-    """Returns the settings with what `auto`, 0 and a relative path stand for here.
-
-    Raises:
-        InputError: PyTorch does not find the device.
-    """
-    images = len(environments.observation_space.shape or ()) >= 2
-    threads = settings.threads or (_cores() if images else 1)
-    weights = str(Path(settings.weights).resolve()) if settings.weights else None
-    return replace(settings, device=_device(settings.device), threads=threads, weights=weights)
-
-
-def memory_of(
-    settings: TrainSettings, environments: Environments, frame_nbytes: float | None = None
-) -> int:
-    """Returns the bytes that the full replay memory of a run takes.
-
-    Args:
-        settings: with its capacity.
-        environments: what it remembers.
-        frame_nbytes: what a frame takes in it, if that has been measured.
-    """
-    from trdlab.deep.memory import memory_needed
-
-    space = environments.observation_space
-    return memory_needed(
-        settings.capacity,
-        space.shape or (),
-        np.dtype(space.dtype),
-        num_envs=environments.num_envs,
-        frame_nbytes=frame_nbytes,
-    )
-
-
-def use_threads(settings: TrainSettings) -> None:
-    """Lets PyTorch use as many threads as a run was made for, in all of this process.
-
-    More of them make a small network slower, and other results than those of the run.
-    """
-    import torch
-
-    torch.set_num_threads(settings.threads)
 
 
 def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer":
@@ -177,15 +144,15 @@ def plan(settings: TrainSettings) -> Plan:
 
     Raises:
         InputError: the environments cannot be made, or have no network.
-        TrdlabError: the replay memory does not fit into what is free.
+        TrdlabError: the run does not fit into what is free.
     """
-    from trdlab.deep.memory import available_memory, check_memory
+    from trdlab.deep.memory import available_memory
     from trdlab.deep.weights import read_weights
 
+    check_threads(settings)
     environments = make_environments(settings)
     try:
         settings = resolved(settings, environments)
-        check_memory(memory_of(settings, environments), settings.capacity)
         warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
         begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)
         trainer = new_trainer(begun, environments)
@@ -221,33 +188,6 @@ def _steps_per_second(trainer: "Trainer", *, until: int | None, at_most: float) 
             break
         trainer.step()
     return (trainer.agent_steps - before) / max(passed, 1e-9)
-
-
-def _cores() -> int:
-    """Returns how many threads may compute here: as the user says, or the system."""
-    told = os.environ.get("OMP_NUM_THREADS", "")
-    if told.isdigit() and int(told) > 0:
-        return int(told)
-    if hasattr(os, "sched_getaffinity"):  # a container may have fewer than the machine
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def _device(wanted: str) -> str:
-    import torch
-
-    found = ["cpu"]
-    if torch.cuda.is_available():
-        found.append("cuda")
-    if torch.backends.mps.is_available():
-        found.append("mps")
-    if wanted == "auto":
-        return found[1] if len(found) > 1 else "cpu"
-    if wanted.partition(":")[0] not in found:
-        raise InputError(
-            f"PyTorch finds no device '{wanted}' here.", f"Use one of: auto, {', '.join(found)}."
-        )
-    return wanted
 
 
 def _for_atari(arguments: dict[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from trdlab.explanations.calibration.trust import Trust, trust
 from trdlab.printable import Printable
 from trdlab.rollouts.branches import Branches
 from trdlab.rollouts.counterfactual import Seen
-from trdlab.rollouts.episodes import Episode
+from trdlab.rollouts.episodes import Episode, distinct
 from trdlab.rollouts.realised import pool
 from trdlab.statistics import FEWEST_EPISODES, Estimate, bootstrap
 
@@ -60,13 +60,13 @@ def score_of(episodes: Sequence[Episode], *, seed: int = 0) -> Score:
     """Returns how an agent did in some episodes, one or more; the seed is of the bootstrap."""
     returns = np.array([episode.rewards.sum() for episode in episodes])
     mean = bootstrap(returns, rng=np.random.default_rng(seed))
-    played = {(e.actions.tobytes(), e.rewards.tobytes(), e.expected.tobytes()) for e in episodes}
-    if len(played) < FEWEST_EPISODES and np.ptp(returns) > 0.0:
+    different = len(distinct(episodes))
+    if different < FEWEST_EPISODES and np.ptp(returns) > 0.0:
         mean = Estimate(mean.value, np.nan, np.nan)
     terminated, limits = sum(e.terminated for e in episodes), {e.time_limit for e in episodes}
     return Score(
         episodes=len(episodes),
-        different=len(played),
+        different=different,
         steps=sum(map(len, episodes)),
         epsilon=max(e.epsilon for e in episodes),
         returns=mean,
@@ -96,7 +96,8 @@ class CalibrationReport(Printable):
         foils: how well the components of actions were predicted that the policy would not have
             taken; None where states were not copied, or where there is no other action.
         scale: the largest component, of any action, by its absolute value.
-        chance: whether steps of which the same was expected went differently.
+        chance: whether steps of which the same was expected went differently, or it was seen that
+            copies share their chance.
         seconds_per_step: how long a step takes as people play, if that is known.
         lost: why there is no ceiling and there are no foils though they were asked for, else empty.
     """
@@ -165,8 +166,9 @@ def judge(
     """
     samples = pool(episodes)
     axis = samples.time_axis
-    for copied in (branches, foils):
-        if copied is not None and copied.time_axis != axis:
+    copies = [of for of in (branches, foils) if of is not None]
+    for copied in copies:
+        if copied.time_axis != axis:
             raise InputError(
                 f"The episodes are of {axis}, the copies of {copied.time_axis}.",
                 "Play both with the same estimator.",
@@ -184,7 +186,7 @@ def judge(
         ceiling=None if branches is None else ceiling_of(branches, seed=seed),
         foils=None if foils is None else calibrate(foils.samples, seed=seed),
         scale=max(float(np.abs(of.decomposition.components).max()) for of in episodes),
-        chance=_has_chance(episodes),
+        chance=_has_chance(episodes) or any(of.shared_chance for of in copies),
         seconds_per_step=seconds_per_step,
     )
 

@@ -246,11 +246,11 @@ def test_the_first_sentences_say_how_it_does_how_far_to_trust_it_and_what_is_wro
         "3.6."
     )
     assert trust.sentence == (
-        "Its forecasts are better than a guess about what comes within 8 steps."
+        "Its forecasts are better than a guess about what comes in the first 8 steps."
     )
     assert wrong.kind == "underestimates"
     assert verdicts(report)[1].sentence == (
-        "Its forecasts are no better than a guess about what comes in 8 to 11 steps."
+        "Its forecasts are no better than a guess about what comes 8 to 11 steps later."
     )
     assert to_dict(report)["trusted"]["last_step"] == 7
 
@@ -266,11 +266,11 @@ def test_good_bad_and_not_tested_are_three_things():
     report = judge(Future("a policy"), [one(i) for i in range(50)])  # type: ignore[misc]
     assert report.trust.status == ("good", "bad", "bad", "not tested")
     assert [claim.sentence for claim in verdicts(report)] == [
-        "Its forecasts are right about what comes now: it was the same every time.",
-        "Its forecasts are wrong about what comes in 1 to 2 steps: 0.1 on average, where 0.75 came "
-        "every time.",
-        "Its forecasts about what comes in 3 steps or later were not tested: episodes were cut off "
-        "before.",
+        "Its forecasts are right about what comes at once: it was the same every time.",
+        "Its forecasts are wrong about what comes 1 to 2 steps later: 0.1 on average, where 0.75 "
+        "came every time.",
+        "Its forecasts about what comes after the first 3 steps were not tested: episodes were cut "
+        "off before.",
     ]
 
 
@@ -317,7 +317,7 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
         check("Trust me.", [(REPORTS, real()[0])])
     with pytest.raises(UnsupportedSentenceError, match="is not true of"):
         check(
-            "Its forecasts are better than a guess about what comes within 2 steps.",
+            "Its forecasts are better than a guess about what comes in the first 2 steps.",
             [(REPORTS, real()[0])],
         )
 

@@ -62,8 +62,8 @@ def _forms(trial: Trial) -> dict[str, Form]:
 
     def at(component: int | None, digits: int) -> str:
         if component is not None:
-            return " " + forms["when"].show(component, digits)
-        return "" if whole else " " + forms["within"].show(axis.num_steps - 1, digits)
+            return forms["when"].show(component, digits) + " "
+        return "" if whole else forms["within"].show(axis.num_steps - 1, digits) + " "
 
     def does(worth: str, pays: str) -> Form:
         return Form(lambda component, _: worth if component is None and whole else pays)
@@ -85,7 +85,7 @@ def tried(trial: Trial) -> Iterator[Fields]:
 
 # ---- whether what was forecast came --------------------------------------------------------------
 
-_MORE = "{more} {component:paid} %s more than {less}{component:at}"
+_MORE = "{component:at}{more} {component:paid} %s more than {less}"
 
 
 @TRIALS.kinds(
@@ -102,18 +102,18 @@ _MORE = "{more} {component:paid} %s more than {less}{component:at}"
             f"{_MORE % 'at most {most:number}'}, less than the {{said:number}} that was forecast."
         ),
         "against-the-forecast": (
-            "Against the forecast, {less} {component:paid} {ahead:estimate} more than {more}"
-            "{component:at}; {more} was to be {said:number} ahead."
+            "Against the forecast, {component:at}{less} {component:paid} {ahead:estimate} more than "
+            "{more}; {more} was to be {said:number} ahead."
         ),
         "no-difference": (
             f"Against the forecast, {_MORE % 'no'}; {{said:number}} more was forecast."
         ),
         "too-few-tries": (
-            "Trying each {copies:times} was too few to tell whether {more} {component:pays} more "
-            "than {less}{component:at}; about {enough:count} would do."
+            "Trying each {copies:times} was too few to tell whether {component:at}{more} "
+            "{component:pays} more than {less}; about {enough:count} would do."
         ),
         "too-close-to-tell": (
-            "Trying cannot tell whether {more} {component:pays} more than {less}{component:at}: "
+            "Trying cannot tell whether {component:at}{more} {component:pays} more than {less}: "
             "they are too close."
         ),
     }

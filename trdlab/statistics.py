@@ -194,6 +194,21 @@ def different_episodes(sums: FloatArray, among: BoolArray) -> IntArray:
     return np.asarray((of.T.astype(np.int64) @ among.reshape(len(sums), -1) > 0).sum(axis=0))
 
 
+def effective(shares: FloatArray) -> FloatArray:
+    """Returns `[...]`: from how many episodes a sum comes, where a few can hold most of it.
+
+    Args:
+        shares: `[E, ...]`, not below 0, what each episode adds.
+
+    Source: Kish (1965), "Survey sampling", on the effective size of a weighted sample.
+
+    >>> effective(np.array([1.0, 1.0, 1.0, 0.0])).item(), effective(np.array([9.0, 1.0])).item()
+    (3.0, 1.2195121951219512)
+    """
+    total, squares = shares.sum(axis=0), (shares**2).sum(axis=0)
+    return np.asarray(total**2 / np.maximum(squares, np.finfo(np.float64).tiny))
+
+
 def has_enough(sums: FloatArray) -> bool:
     """Returns whether the different episodes among `sums [E, ...]` are enough for an interval."""
     among = np.ones((len(sums), 1), dtype=np.bool_)

@@ -35,12 +35,12 @@ def test_what_a_future_says_is_what_it_is_judged_by():
     assert Future("p").to_dict() == {
         "policy": "p",
         "reward": "reward as the environment pays it",
-        "ending": "terminal states",
+        "ending": "the end of the episode",
     }
     assert pays() == [10.0] * 3
     assert Future("p", clip_rewards=True).reward == "sign of each reward"
     assert pays(clip_rewards=True) == [1.0] * 3
-    assert Future("p", time_limit_ends=True).ending == "terminal states, or the time limit"
+    assert Future("p", time_limit_ends=True).ending == "the end of the episode, or the time limit"
     assert pays(time_limit_ends=True) == [10.0] * 3
 
 

@@ -17,6 +17,7 @@ from trdlab.estimator import Estimator, Future
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.tabular import MDP, ExactTable, ModelEnvironments, exact
+from trdlab.training.loading import evaluate_run
 
 DOWN = [0.0, 0.95, 0.95**2, 0.95**3, 0.95**4]
 
@@ -123,7 +124,7 @@ def test_what_is_no_agent_says_what_is_missing(what, given, message):
 def test_a_notebooks_first_cell_explains_the_drone():
     explained = trdlab.explain("gridworld:drone", episodes=20)
     assert explained.choice.action == "down"
-    assert explained.report.num_episodes == 20
+    assert explained.report.judged.episodes == 20
     one = trdlab.explain(
         "gridworld:drone", step=1, action=3, parts="forecast", episodes=0, horizon=8
     )
@@ -132,7 +133,7 @@ def test_a_notebooks_first_cell_explains_the_drone():
 
 def test_calibration_and_comparison_are_one_call_each():
     report = trdlab.calibrate("gridworld:ledge", episodes=100)
-    assert report.num_episodes == 100
+    assert report.judged.episodes == 100
     assert report.ceiling is not None
     comparison = trdlab.compare(
         "gridworld:ledge", "gridworld:ledge,slip=0.3", episodes=3, gamma=0.9
@@ -196,12 +197,24 @@ def test_what_can_be_there_only_once_is_played_one_after_another():
 
     explained = trdlab.explain(Sure(), env=OnlyOne, episodes=12)
     assert OnlyOne.running == 0
-    assert explained.report.num_episodes == 12
-    assert explained.report.endings.terminated == 12
+    assert explained.report.judged.episodes == 12
+    assert explained.report.judged.terminated == 12
     assert explained.report.calibration.error.value[:3].tolist() == [0.0] * 3
     assert explained.report.ceiling is None
     assert "OnlyOne" in explained.report.lost
     assert explained.trial is None
+
+
+def test_what_can_be_there_only_once_is_trained_and_then_evaluated(tmp_path, monkeypatch):
+    spec = gym.envs.registration.EnvSpec("OnlyOne-v0", OnlyOne)
+    monkeypatch.setitem(gym.registry, "OnlyOne-v0", spec)
+    small = {"num_envs": 1, "agent_steps": 200, "learning_starts": 100, "horizon": 2, "hidden": [8]}
+    threads = torch.get_num_threads()
+    trdlab.train("OnlyOne-v0", out=tmp_path / "run", **small)
+    result, _ = evaluate_run(tmp_path / "run", episodes=3)
+    torch.set_num_threads(threads)
+    assert OnlyOne.running == 0
+    assert result.returns.tolist() == [2.0 + (length == 3) for length in result.lengths]
 
 
 def test_no_verb_is_hidden_by_a_module_and_none_imports_torch():

@@ -37,23 +37,18 @@ __all__ = [
     "train",
 ]
 
-_HOMES = {
-    "Agent": "agents.agent",
-    "RewardDecomposition": "decomposition",
-    "TimeAxis": "time_axis",
-    "Estimator": "estimator",
-    "Future": "estimator",
-    "Policy": "policies.protocol",
-    "load": "training.loading",
-    "agent": "verbs",
-    "calibrate": "verbs",
-    "compare": "verbs",
-    "explain": "verbs",
-    "solve": "verbs",
-    "train": "verbs",
-}
-
-__getattr__ = lazily(__name__, _HOMES)
+__getattr__ = lazily(
+    __name__,
+    {
+        "agents.agent": "Agent",
+        "decomposition": "RewardDecomposition",
+        "estimator": "Estimator Future",
+        "policies.protocol": "Policy",
+        "time_axis": "TimeAxis",
+        "training.loading": "load",
+        "verbs": "agent calibrate compare explain solve train",
+    },
+)
 
 # A command started from a notebook inherits the notebook's backend, which may not be installed
 # here, and then matplotlib could not even be imported.

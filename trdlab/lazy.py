@@ -4,16 +4,19 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 
 
-def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], object]:
-    """Returns the `__getattr__` of a package that imports a name from its home.
+def lazily(package: str, names: Mapping[str, str]) -> Callable[[str], object]:
+    """Returns the `__getattr__` of a package that imports a name from the module it lives in.
+
+    Type checkers do not see it: for them the package imports the same names under `TYPE_CHECKING`.
 
     Args:
         package: its full name.
-        homes: the module within the package that each name lives in.
+        names: those of each module within the package, with spaces between.
 
-    >>> lazily("trdlab", {"TimeAxis": "time_axis"})("TimeAxis").__name__
+    >>> lazily("trdlab", {"time_axis": "TimeAxis"})("TimeAxis").__name__
     'TimeAxis'
     """
+    homes = {name: module for module, some in names.items() for name in some.split()}
 
     def find(name: str) -> object:
         if name not in homes:

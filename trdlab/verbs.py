@@ -59,10 +59,12 @@ def agent(
     from trdlab.agents.given import agent_of
     from trdlab.agents.models import model_of
     from trdlab.agents.naming import find_agent
-    from trdlab.agents.places import AXIS, as_words, changed
+    from trdlab.agents.places import AXIS, changed
+    from trdlab.environments.arguments import say_arguments
     from trdlab.policies import acting
 
-    words, axis = as_words(env_arguments or {}), (gamma, horizon, width)
+    axis, given = (gamma, horizon, width), env_arguments or {}
+    words = tuple(say_arguments({key: value}) for key, value in given.items())
     if isinstance(what, str | Path):
         made = find_agent(
             str(what), gamma=gamma, horizon=horizon, width=width, env=env, env_arguments=words

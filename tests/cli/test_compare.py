@@ -15,23 +15,30 @@ def test_two_tables_are_compared_and_a_picture_is_drawn(trdlab, tmp_path):
     assert code == 0
     assert out.startswith("A: ledge · B: ledge,slip=0.3")
     assert "both act in gridworld:ledge" in out
-    assert "A expects more in all than B" in out
-    assert "They were compared at" in out
+    assert "A expects more than B: 0." in out
+    assert "They were compared at" not in out
     folder = Path("explanations") / "ledge-against-ledge,slip=0.3"
     assert err == f"Picture: {folder / 'comparison.png'}\n"
     assert (folder / "comparison.png").read_bytes().startswith(b"\x89PNG")
-    trdlab("compare", *TABLES, "--episodes", 2)
+    _, out, _ = trdlab("compare", *TABLES, "--episodes", 2, "--details")
+    assert "They were compared at" in out
     assert Path(f"{folder}-2").is_dir()
 
 
-def test_the_commands_that_are_printed_run(trdlab):
+def further(out: str) -> list[str]:
+    """Returns the words of the command that is suggested last, behind `trdlab`."""
+    suggested = out.splitlines()[-1]
+    assert suggested.startswith("Try: trdlab explain ")
+    return suggested.split()[2:]
+
+
+def test_the_command_that_is_printed_runs(trdlab):
     _, out, _ = trdlab("compare", *TABLES, "--episodes", 5, "--gamma", 0.9, "--N", 3, "--out", "x")
-    commands = [line.split()[1:] for line in out.splitlines() if "trdlab explain" in line]
-    assert len(commands) == 3
-    for words in commands:
-        code, shown, _ = trdlab(*words, "--what", "forecast", "--episodes", 0)
-        assert code == 0
-        assert "γ = 0.9, N = 3, w = 1" in shown
+    code, shown, _ = trdlab(*further(out), "--what", "forecast", "--episodes", 0)
+    assert code == 0
+    assert "γ = 0.9 · N = 3 · w = 1" in shown
+    _, out, _ = trdlab("compare", *[TABLES[0]] * 2, "--episodes", 2, "--out", "y")
+    assert "Try:" not in out
 
 
 def test_checkpoints_of_a_run(trdlab, trained):
@@ -45,17 +52,16 @@ def test_checkpoints_of_a_run(trdlab, trained):
     _, again, _ = trdlab("compare", f"{trained}@500", trained, "--episodes", 10, "--json")
     assert again == out
     _, out, _ = trdlab("compare", f"{trained}@1000", trained, "--episodes", 10, "--json")
-    assert json.loads(out)["findings"][0]["kind"] == "nothing-differs"
+    assert json.loads(out)["answer"][0]["kind"] == "nothing-differs"
 
 
 def test_a_run_beside_the_exact_table_that_takes_its_axis(trdlab, trained):
     table = "gridworld:drone,slip=0.2"
-    code, out, _ = trdlab("compare", table, trained, "--episodes", 10, "--out", "pictures")
+    code, out, _ = trdlab("compare", table, trained, "--episodes", 10, "--out", "x", "--details")
     assert code == 0
-    assert "γ = 0.9, N = 6, w = 1 · both act in gridworld:drone,slip=0.2" in out
+    assert "γ = 0.9 · N = 6 · w = 1 · both act in gridworld:drone,slip=0.2" in out
     assert "B tells of the future of the greedy policy of the network" in out
-    words = next(line for line in out.splitlines() if "trdlab explain" in line).split()
-    assert trdlab(*words[1:], "--what", "forecast", "--episodes", 0)[0] == 0
+    assert trdlab(*further(out), "--what", "forecast", "--episodes", 0)[0] == 0
 
 
 def test_elsewhere(trdlab, trained):

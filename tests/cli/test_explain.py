@@ -1,7 +1,7 @@
 """`trdlab explain` as its users see it."""
 
+import html
 import json
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+import trdlab
 from trdlab.rollouts.playing import Playing
 
 
@@ -23,11 +24,15 @@ def explain(trdlab) -> Callable[..., tuple[int, str, str]]:
 def test_without_options_it_says_what_matters_most_and_where_pictures_went(explain, tmp_path):
     code, out, err = explain("gridworld:drone", "--episodes", 40)
     assert code == 0
-    assert "drone · step 0 of the episode with seed 0 · down or up" in out
-    assert "the future of the optimal policy" in out
-    assert "It scored 4 in its one episode" in out
-    assert "Its forecasts are better than a guess about what comes within 4 steps." in out
-    assert "down is worth 3.52 and up 3.26." in out
+    assert out.startswith("drone · step 0 of the episode with seed 0\nγ = 0.95 · N = 4 · w = 1\n")
+    assert out.splitlines()[-5:] == [
+        "It scored 4 in its one episode, which is the same every time.",
+        "Down gives more immediate rewards: 2.71 in the first 4 steps, where up gives nothing.",
+        "Both pay 4 in total, but each step of waiting makes a reward count 5 % less: "
+        "down is worth 3.52, up 3.26.",
+        "As forecast, down was worth 0.266 more than up.",
+        "Its forecasts are better than a guess about what comes within 4 steps.",
+    ]
     moments = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png"]
     names = [*moments, "episode-seed-0.png", "calibration.png"]
     paths = [Path("explanations") / "drone" / name for name in names]
@@ -37,15 +42,57 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(expla
     assert (tmp_path / "explanations" / "drone-2" / "calibration.png").exists()
 
 
+def test_a_notebook_shows_what_the_command_prints(explain, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = explain("gridworld:drone", "--episodes", 40)
+    explained = trdlab.explain("gridworld:drone", episodes=40)
+    assert f"{explained}\n" == out
+    assert max(map(len, out.splitlines())) <= 80
+    assert len(out.splitlines()) <= 24
+    assert repr(explained) == "<Explanation: drone · step 0 of the episode with seed 0>"
+    shown = html.unescape(explained._repr_html_())
+    assert all(claim.sentence in shown for claim in explained.answer)
+
+
+def test_the_first_lines_of_the_readme_print_what_the_command_prints(explain, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert f"{trdlab.explain('gridworld:drone')}\n" == explain("gridworld:drone")[1]
+
+
+def test_the_details_are_all_there_is_to_tell(explain):
+    words = ("gridworld:ledge", "--episodes", 40)
+    _, brief, _ = explain(*words, "--out", "a")
+    _, out, _ = explain(*words, "--out", "b", "--details")
+    data = json.loads(explain(*words, "--json")[1])
+    answer = [claim["sentence"] for claim in data["answer"]]
+    assert brief.splitlines()[-len(answer) :] == answer
+    assert len(answer) == 5
+    told = [(part["heading"], part["findings"]) for part in data["sections"]]
+    lines = [line for heading, found in told for line in (heading, *map(indented, found))]
+    assert out.splitlines()[-len(lines) :] == lines
+    headings = ["Why right, not down", "What would change that", "What to expect of right"]
+    assert [heading for heading, _ in told][:3] == headings
+    assert [heading for heading, _ in told][-1] == "What this rests on"
+
+
+def indented(finding: dict[str, Any]) -> str:
+    return f"  {finding['sentence']}"
+
+
 def test_a_contrast_at_a_step_with_named_and_numbered_actions(explain):
     code, out, err = explain(
         "gridworld:ledge", "--what", "contrast", "--step", 1, "--action", "up", "--foil", 3
     )
     assert (code, err) == (0, "")
-    assert "ledge · step 1 of the episode with seed 0 · up or right" in out
-    assert "With γ = 0.95 right is worth 0.84 and up 0.80." in out
-    assert "How far to trust it" in out
-    assert "first expected to cost" not in out  # that is the forecast
+    assert out.startswith("ledge · step 1 of the episode with seed 0\n")
+    assert "\nHow up differs from right\n" in out
+    assert "up − right   [" in out
+    assert "right is worth 0.838, up 0.797." in out
+    assert "Tried out" in out
+    assert "What to expect of" not in out  # that is the forecast
+    _, out, _ = explain("gridworld:ledge", "--what", "forecast", "--step", 1, "--episodes", 0)
+    assert "What to expect of right" in out
+    assert " − " not in out  # that is the contrast
 
 
 def test_the_story_of_an_episode_as_text_as_json_and_as_a_picture(explain):
@@ -53,27 +100,26 @@ def test_the_story_of_an_episode_as_text_as_json_and_as_a_picture(explain):
     code, out, err = explain(*words, "--out", "pictures")
     assert code == 0
     assert "loop,slip=0.2 · the episode with seed 3" in out
-    assert "At the start it expected rewards worth 1.14 in all" in out
-    assert re.search(r"\n *1\. ", out)
+    assert "At the start it expected rewards worth 1.14, the largest part in 4 steps or" in out
     assert "The episode was cut off after 100 steps." in out
-    assert "The future of the optimal policy" in out
     assert err == "Picture: pictures/episode-seed-3.png\n"
     _, out, _ = explain(*words, "--json")
     data = json.loads(out)
     assert data["moment"] is None
     assert (data["episode"]["seed"], data["episode"]["steps"]) == (3, 100)
-    assert data["episode"]["findings"][-1]["kind"] == "cut-off"
+    (section,) = data["sections"]
+    assert (section["name"], section["findings"][-1]["kind"]) == ("episode", "cut-off")
 
 
 def test_a_calibration_as_text_and_as_json(explain):
     _, out, err = explain("gridworld:ledge", "--what", "calibration", "--N", 3, "--gamma", 0.9)
-    assert "γ = 0.9, N = 3, w = 1" in out
-    assert "Its forecasts are better than a guess about what comes at any time." in out
+    assert out.startswith("ledge\nγ = 0.9 · N = 3 · w = 1\n")
+    assert "Its forecasts were judged by 300 episodes of 952 steps in all." in out
     assert err == ""
     code, out, _ = explain("gridworld:ledge", "--what", "calibration", "--json", "--episodes", 50)
     data = json.loads(out)
     assert code == 0
-    assert data["schema"] == "trdlab.explanations/1"
+    assert data["schema"] == "trdlab.explain/2"
     assert data["calibration"]["schema"] == "trdlab.trust/2"
     assert data["calibration"]["judged"]["episodes"] == 50
     assert not Path("explanations").exists()
@@ -84,7 +130,7 @@ def test_a_map_file_is_an_agent_too(explain, tmp_path):
     file.write_text("S..C\n", encoding="utf-8")
     code, out, _ = explain(file, "--what", "forecast", "--N", 3, "--episodes", 0)
     assert code == 0
-    assert "The first reward to be expected of right is that of t+2: 1 on average" in out
+    assert "After right the first reward comes in 2 steps: 1." in out
     assert "How far to trust it" not in out
 
 
@@ -105,9 +151,9 @@ def test_a_run_is_explained_by_its_own_rewards(explain, trained):
 
 
 def test_a_run_says_how_long_a_step_is(explain, trained):
-    _, out, _ = explain(trained, "--episodes", 12, "--out", "pictures")
+    _, out, _ = explain(trained, "--episodes", 12, "--out", "pictures", "--details")
     assert "a step is 0.25 s of play" in out
-    assert "sign of each reward" in out
+    assert "It counts the sign of each reward." in out
     assert len(list(Path("pictures").iterdir())) == 4
 
 

@@ -44,6 +44,7 @@ def command_lines(draw: st.DrawFn) -> list[str]:
     words = ["gridworld", "--map", draw(usually(names, ["dron", "no.txt", ".", *JUNK]))]
     for option in draw(st.lists(st.sampled_from(sorted(OPTIONS)), max_size=4, unique=True)):
         words += [option, draw(OPTIONS[option])]
+    words += ["--details"] * draw(st.booleans())
     flag = draw(st.integers(0, 3))
     return words + ([] if flag == 0 else ["--json"] if flag < 3 else [draw(st.sampled_from(FLAGS))])
 
@@ -88,7 +89,7 @@ def outcome(capsys: pytest.CaptureFixture[str], words: list[str]) -> tuple[int, 
         check_numbers(json.loads(out))
         return code, "JSON"
     if "components:" in out:
-        assert "Whose future" in out
+        assert ("Whose future" in out) == ("--details" in words)
         assert "Components sum to Q" in " ".join(out.split())
         return code, "text"
     return code, "other"
@@ -105,7 +106,9 @@ def check_numbers(data: dict[str, Any]) -> None:
     chosen = [action["q_value"] for action in actions.values() if action["probability"] > 0]
     assert min(chosen) >= best - 1e-6 * max(1.0, abs(best))
     assert data["action"] in actions
-    assert data["findings"]
+    assert 1 <= len(data["answer"]) <= 5
+    is_over = data["answer"][0]["kind"] == "episode-is-over"
+    assert data["sections"][-1]["name"] == ("forecast" if is_over else "context")
 
 
 def settle(kinds: Counter[str]) -> None:

@@ -121,7 +121,7 @@ def test_the_page(capsys: pytest.CaptureFixture[str]):
     assert "cuts episodes off after 100 steps; the model does not." in out
     assert "[0, 0, 0, 0, 0, 0.77, 0]" in out
     assert "Components sum to Q" in out
-    assert "Down and right have the same components." in text
+    assert "Down and right lead to the same rewards at the same times." in text
 
 
 def test_the_advice_can_be_followed(capsys: pytest.CaptureFixture[str]):
@@ -151,7 +151,7 @@ def test_arguments_change_the_environment(capsys: pytest.CaptureFixture[str]):
 
 def test_what_flips_the_preference_does(capsys: pytest.CaptureFixture[str]):
     words = (TAXI, "--state", "0,0,R,G", "--action", "pickup", "--foil", "north")
-    never = "No searched value of γ makes north better than pickup."
+    never = "No value that was tried for γ makes north better than pickup."
     assert never in run(capsys, *words, "--details")[1]
     data = loaded(capsys, "FrozenLake-v1", "--foil", "down")
     findings = [finding for section in data["sections"] for finding in section["findings"]]
@@ -166,7 +166,7 @@ def test_to_fall_off_the_cliff_is_an_alternative_and_when_it_costs_is_told_first
     capsys: pytest.CaptureFixture[str],
 ):
     _, out, _ = run(capsys, CLIFF, "--N", "14")
-    assert "What decides comes now: up costs 1 and right costs 100." in out
+    assert "What comes at once decides: up costs 1 then and right costs 100." in out
     right = next(line for line in out.splitlines() if line.startswith("right"))
     assert "stays" not in right
 

@@ -181,6 +181,31 @@ def test_each_copy_is_of_the_environment_that_is_asked_for():
     assert copies.step(np.array([0, 0, 0])).frames.ravel().tolist() == [4.0, 1.0, 4.0]
 
 
+class Plugged(Clock):
+    """Its deep copies are told from it only when they are closed: they hang on the same plug."""
+
+    def __init__(self):
+        self.plug = [True]
+
+    def step(self, action):
+        assert self.plug
+        return super().step(action)
+
+    def close(self):
+        self.plug.clear()
+
+    def __deepcopy__(self, memo):
+        twin = Plugged()
+        twin.__dict__.update(self.__dict__)
+        return twin
+
+
+def test_copies_can_be_closed():
+    environments = at(Plugged, 7)
+    environments.branch(np.array([0, 0]), seed=1).close()
+    assert paid(environments, 3).ravel().tolist() == [0.0, 1.0, 1.0]
+
+
 def test_a_copy_that_was_proved_in_the_beginning_is_looked_at_again_later():
     class Late(Clock):
         """Its copies begin again from step 20 on."""

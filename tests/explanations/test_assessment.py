@@ -8,12 +8,20 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+import moments
+import trdlab
+from by_hand import Given
 from trdlab.agents import Agent, gridworld_agent
-from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments, GymEnvironments
 from trdlab.errors import InputError
-from trdlab.explanations import assess, check, explain, moment_at, sentences
+from trdlab.estimator import Future
+from trdlab.explanations import assess, check, explain, moment_at, try_out
+from trdlab.explanations.assessment import judged
+from trdlab.explanations.calibration import claims as calibration
 from trdlab.explanations.calibration.faults import faults
+from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
 from trdlab.rollouts import Copying, collect
 from trdlab.tabular import MDP, ExactTable, ModelEnvironments, exact
@@ -74,16 +82,47 @@ def test_what_is_wrong_from_some_step_on_is_marked_in_every_explanation():
     assert isinstance(table, ExactTable)
     components = table.decomposition.components.copy()
     components[..., 2:] += np.random.default_rng(0).normal(size=components[..., 2:].shape)
-    wrong = replace(table, decomposition=RewardDecomposition(components, AXIS))
-    agent = replace(agent, estimator=wrong)
-    trust = assess(agent, episodes=200).trust
-    assert trust.last_step == 1
-    assert trust.doubtful.tolist() == [False, False, True, True, True]
-    explanation = explain(replace(moment_at(agent), trust=trust))
-    said = "From t+2 on such forecasts have not proved better than a guess."
-    assert said in sentences(explanation)
-    check(said, explanation)
-    assert "guess" not in " ".join(sentences(explain(moment_at(agent))))
+    agent = replace(agent, estimator=Given(components, AXIS, table.future))
+    report = assess(agent, episodes=200)
+    assert report.trust.last_step == 1
+    assert report.trust.doubtful.tolist() == [False, False, True, True, True]
+    moment = moment_at(agent)
+    choice = judged(moment, report).choice("right", "up")
+    off = np.abs(moment.difference("right", "up"))
+    said = (
+        f"{100 * off[2:].sum() / off.sum():.0f} % of the difference between right and up comes in "
+        "2 steps or later, and that is not to be trusted."
+    )
+    assert said in told(choice)
+    check(said, [(CHOICES, choice)])
+    assert "trusted" not in " ".join(told(moment.choice("right", "up")))
+
+
+def test_a_table_is_exact_only_in_its_own_model():
+    own, other = Gridworld(load_map("ledge")), Gridworld(load_map("ledge").with_slip(0.6))
+    table = exact(own.mdp, AXIS)
+    for place, is_exact in (
+        (None, True),
+        ("gridworld:ledge", True),
+        ("gridworld:ledge,exploring_starts=true", True),
+        (own, True),
+        (gym.make("trdlab/LedgeGridworld-v0"), True),
+        (gym.wrappers.TransformReward(gym.make("trdlab/LedgeGridworld-v0"), lambda r: -r), False),
+        ("gridworld:ledge,slip=0.6", False),
+        ("trdlab/LedgeGridworld-v0", False),  # it may be anything
+        (other, False),
+    ):
+        for agent in (gridworld_agent("ledge", AXIS, env=place), trdlab.agent(table, env=place)):
+            assert moment_at(agent).is_exact == is_exact, place
+    moved = trdlab.agent(gridworld_agent("ledge", AXIS), env=other)
+    explained = explain(moved, episodes=100)
+    claims = [claim.sentence for part in explained.sections for claim in part.claims]
+    assert not any("5 % chance" in sentence for sentence in claims)  # that is so in its model
+    assert any("is not to be trusted" in sentence for sentence in claims)
+
+
+def told(choice: Choice) -> list[str]:
+    return [claim.sentence for claim in moments.told(choice)]
 
 
 class Once(gym.Env):
@@ -121,6 +160,37 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
     report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
     assert (report.ceiling is not None) == (report.foils is not None) == copyable
     assert report.lost == "" if copyable else "Once-v0 cannot be copied: " in report.lost
+
+
+class Tossed(gym.Env):
+    """Pays 0 or 1 at each of twelve steps, by a generator that nobody can copy or seed anew."""
+
+    observation_space, action_space = gym.spaces.Discrete(12), gym.spaces.Discrete(4)
+
+    def reset(self, *, seed=None, options=None):
+        rng = np.random.default_rng(seed)
+        self.at, self.tosses = 0, (rng.integers(2) for _ in range(12))
+        return 0, {}
+
+    def step(self, action):
+        self.at += 1
+        return min(self.at, 11), float(next(self.tosses)), self.at == 12, False, {}
+
+
+def test_copies_that_share_their_chance_do_not_tell_that_all_can_be_known():
+    axis = TimeAxis(0.95, 2, 2)  # of two steps in one no episode tells that each is a toss
+    halves = Given(np.full((12, 4, 3), 0.5), axis, Future("any policy"))
+    agent = trdlab.agent(halves, env=Tossed)
+    report = assess(agent, episodes=40, copying=Copying())
+    assert report.ceiling is not None
+    assert report.ceiling.deterministic
+    assert report.chance
+    said = [claim.sentence for part in calibration.sections(report) for claim in part.claims]
+    assert not any("all that comes can be known" in sentence for sentence in said)
+    assert any("the copies may share their chance" in sentence for sentence in said)
+    tried = try_out(agent, "action 0", "action 1", copies=3).found
+    assert tried.same_every_time
+    assert tried.observed.low[0] < tried.observed.high[0]  # though all six copies went alike
 
 
 @pytest.mark.parametrize("seed", range(4))

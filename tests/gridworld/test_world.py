@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError, MapError
 from trdlab.gridworld import Gridworld, load_map, map_names, parse_map
 from trdlab.gridworld.world import Source, State
-from trdlab.tabular import MDP
+from trdlab.tabular import MDP, exact
 
 UP, DOWN, LEFT, RIGHT = range(4)
 
@@ -272,3 +273,10 @@ def test_hazards_and_floor_out_of_reach_are_fine():
 def test_too_many_states_are_refused_with_the_count():
     with pytest.raises(MapError, match=r"more than 50000 .*\(5\d{4} counted.* its 20 one-time"):
         world_of("S" + "." * 9, *["c" * 10] * 2)
+
+
+@pytest.mark.parametrize("name", ["drone", "bridge"])
+def test_rewards_too_large_to_square_are_refused_by_that_reason(name):
+    world = Gridworld(load_map(name).with_value("treasure", 1e160))
+    with pytest.raises(InputError, match=r"Rewards of 1e\+160 .* square is beyond double"):
+        exact(world.mdp, TimeAxis(0.95, 2))

@@ -86,4 +86,4 @@ def test_episodes_that_are_all_alike_are_not_played_again(name, epsilon, played,
         return agent.make(num_envs, seed)
 
     report = assess(replace(agent, make=make), episodes=300, epsilon=epsilon)
-    assert (made, report.num_episodes) == (played, judged_by)
+    assert (made, report.judged.episodes) == (played, judged_by)

@@ -1,4 +1,4 @@
-"""Models too large for a dense solve: values by sweeps, the decomposition as a stream."""
+"""Models too large for a dense solve: values by passes, the decomposition as a stream."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.tabular import MDP, evaluate, exact, optimal
 from trdlab.tabular.series import components, decompose
-from trdlab.tabular.sweeps import BLOCK, optimal_values
+from trdlab.tabular.sweeps import BLOCK
 
 
 def random_mdp(states: int, actions: int, successors: int, seed: int) -> MDP:
@@ -103,37 +103,30 @@ def test_optimal_values_are_optimal(seed: int):
 
 
 def test_many_blocks_agree_with_plain_value_iteration():
-    mdp = slippery_field(200, goals=3)
+    mdp = slippery_field(100, goals=3)
     assert mdp.num_states > 2 * BLOCK
     values = np.zeros(mdp.num_states)
     for _ in range(600):  # 0.9⁶⁰⁰ is nothing
         values = (mdp.expected_rewards + 0.9 * mdp.expect(values)).max(axis=1)
-    found, bound = optimal_values(mdp, 0.9, 1e-9)
-    assert bound <= 1e-9
-    assert np.abs(found - values).max() <= bound
+    solution = optimal(mdp, 0.9)
+    error = (solution.policy * solution.error_bound).sum(axis=1)
+    assert (np.abs(solution.state_values - values) <= error + 1e-14).all()
+    np.testing.assert_array_less(error, 1e-10 * values + 1e-300)  # as small as the values are
 
 
 def test_costs_alone_are_solved_too():
     """Each step costs 1 until the goal: there is no positive reward to begin from."""
     mdp = slippery_field(40)
     costly = mdp.with_rewards(np.where(mdp.terminated, 0.0, -1.0))
-    found, bound = optimal_values(costly, 0.95, 1e-9)
+    solution = optimal(costly, 0.95)
+    found = solution.state_values
     bellman = (costly.expected_rewards + 0.95 * costly.expect(found)).max(axis=1)
-    assert np.abs(bellman - found).max() <= 1e-9
-    assert bound <= 1e-9
+    assert np.abs(bellman - found).max() <= 1e-12
+    assert solution.error_bound.max() <= 1e-11
     assert found.min() > -20.0  # what it costs to wander for ever
 
 
-def test_the_tolerance_is_kept_and_a_finer_one_than_rounding_is_refused():
-    mdp = slippery_field(40)
-    rough, fine = optimal(mdp, 0.95, tolerance=1e-4), optimal(mdp, 0.95)
-    assert rough.error_bound.max() <= 1e-4
-    assert np.abs(rough.q_values - fine.q_values).max() <= 1e-4 + 1e-9
-    with pytest.raises(InputError, match="finer than rounding allows"):
-        optimal_values(mdp, 0.95, 1e-18)
-
-
-def test_close_to_1_gamma_takes_the_direct_way_to_the_same_answer():
+def test_close_to_1_gamma_has_the_same_answer():
     mdp = slippery_field(30)
     direct = optimal(mdp, 0.999)
     assert direct.error_bound.max() < 1e-9

@@ -1,6 +1,7 @@
 """Learned tables against exact ones: of a policy, of the optimum, and of the learner's operator."""
 
 import re
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -332,9 +333,7 @@ def test_learning_refuses_when_every_window_was_dropped():  # errata C3
 
 
 def test_learning_refuses_when_no_tail_was_greedy():
-    with pytest.raises(
-        TrdlabError, match=r"In none of \d+ windows of 20 steps was the tail greedy"
-    ):
+    with pytest.raises(TrdlabError, match=r"None of \d+ windows of 20 steps followed the policy"):
         learn(
             WORLDS["lake"],
             TimeAxis(0.9, 2, 20),
@@ -406,3 +405,44 @@ def test_observations_that_are_no_states_are_refused():
 def test_epsilon_greedy_is_a_distribution():
     policy = epsilon_greedy(np.array([2, 0]), 3, 0.3)
     np.testing.assert_allclose(policy, [[0.1, 0.1, 0.8], [0.8, 0.1, 0.1]])
+
+
+class Period(gym.Env):
+    """State 0 leads to 1 and 1 to 0, for ever; action 1 pays 1 in state 0 and 3 in state 1."""
+
+    observation_space, action_space = gym.spaces.Discrete(3), gym.spaces.Discrete(2)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.at = 0
+        return np.int64(0), {}
+
+    def step(self, action):
+        paid, self.at = action * (1.0 + 2.0 * self.at), 1 - self.at
+        return np.int64(self.at), paid, False, False, {}
+
+
+@pytest.mark.parametrize("width", [1, 2, 4])
+def test_windows_begin_at_every_step_whatever_the_period(width):
+    rows = [[[(1.0, 1 - s, a * (1.0 + 2.0 * s), False)] for a in (0, 1)] for s in (0, 1)]
+    mdp, policy = MDP.from_transitions(rows), np.array([[0.5, 0.5], [0.0, 1.0]])
+    axis = TimeAxis(0.5, 2, width)
+    padded = np.concatenate([policy, [[1.0, 0.0]]])
+    learned = learn(Period(), axis, policy=padded, agent_steps=20_000)
+    truth = exact(mdp, axis, policy=policy).decomposition.components
+    assert (learned.visits[:2] > 500).all()
+    np.testing.assert_allclose(learned.decomposition.components[:2], truth, atol=0.1)
+
+
+def test_what_was_never_learned_is_told():
+    """State 2 does not exist, and the policy of state 1 never takes action 0."""
+    policy = np.array([[0.5, 0.5], [0.0, 1.0], [1.0, 0.0]])
+    learned = learn(Period(), TimeAxis(0.5, 2), policy=policy, agent_steps=500)
+    assert learned.unlearned.tolist() == [[False, False], [False, False], [True, True]]
+    told = "No window began in state 2. Nothing was learned of them."
+    assert str(learned).endswith(told)
+    assert "500 windows of 1 steps" in str(learned)
+    visits = np.array([[5, 0], [3, 2], [0, 0]])
+    partly = str(replace(learned, visits=visits))
+    assert "No window began in state 2. Nor with state and action (0, 1)." in partly
+    assert str(replace(learned, visits=visits + 1)).endswith("windows of 1 steps.")

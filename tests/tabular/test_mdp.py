@@ -54,6 +54,7 @@ def test_other_rewards_leave_the_dynamics_alone():
         ([[]], "no transition"),
         ([[[STAY], []]], "State 0, action 1 has no transition"),
         ([[[STAY], [END]], [[STAY]]], "State 1 has 1 actions, state 0 has 2"),
+        ([[[(1.0, 0, 0.0, float("nan"))]]], "terminates is told by nan. Give True or False"),
         ([[[STAY], [(0.5, 0, 0.0, False)]]], r"State 0, action 1 sum to 0\.5"),
         ([[[(1.5, 0, 0.0, False), (-0.5, 0, 0.0, True)]]], "negative probability"),
         ([[[(1.0, 1, 0.0, False)]]], "state that does not exist"),
@@ -93,3 +94,24 @@ def test_a_start_and_arrays_that_do_not_fit_are_refused():
 def test_what_is_no_policy_is_refused(policy, message):
     with pytest.raises(InputError, match=message):
         evaluate(MDP.from_transitions([[[STAY], [END]]]), policy, 0.9)
+
+
+def test_single_precision_is_divided_by_its_sum_and_said():
+    """Three times float32(1/3) is 1.0000000298."""
+    third = np.float32(1 / 3)
+    row = [(third, i, float(i), i == 2) for i in range(3)]
+    mdp = MDP.from_transitions([[row], [[STAY]], [row]])
+    assert mdp.rounded_rows == 2
+    assert mdp.probabilities.tolist() == pytest.approx([1 / 3] * 3 + [1.0] + [1 / 3] * 3, abs=1e-16)
+    with pytest.raises(
+        InputError, match=r"sum to 1\.0000000"
+    ):  # such a sum is a mistake in doubles
+        MDP.from_transitions([[[(1 / 3 + 1e-8, i, 0.0, False) for i in range(3)]]] * 3)
+    with pytest.raises(InputError, match=r"sum to 0\.99"):
+        MDP.from_transitions([[[(np.float32(0.33), i, 0.0, False) for i in range(3)]]] * 3)
+
+
+@pytest.mark.parametrize("start", ["0", 0.5, None, -1, 1])
+def test_a_start_that_is_no_state_is_refused(start):
+    with pytest.raises(InputError, match=f"start state {start!r} does not exist"):
+        MDP.from_transitions([[[STAY]]], start=start)

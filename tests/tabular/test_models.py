@@ -10,9 +10,11 @@ import pytest
 import scipy.sparse as sp
 from gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv
 
+from moments import told
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.explanations import check, explain, sentences, tabular_moment
+from trdlab.explanations import check, tabular_moment
+from trdlab.explanations.moment.moment import CHOICES
 from trdlab.tabular import (
     MDP,
     exact,
@@ -480,5 +482,6 @@ def test_the_table_works_in_the_wrapper_and_in_explanations():
         if terminated or truncated:
             state, info = wrapped.reset()
     for state in range(16):
-        explanation = explain(tabular_moment(table, state, world.action_names))
-        assert check(" ".join(sentences(explanation)), explanation)
+        choice = tabular_moment(table, state, world.action_names).choice()
+        said = [claim.sentence for claim in told(choice)]
+        assert len(check(" ".join(said), [(CHOICES, choice)])) == len(said) > 0

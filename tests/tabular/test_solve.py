@@ -250,6 +250,21 @@ def test_totals_are_the_limit_of_discounted_values(mdp, seed):
     np.testing.assert_array_equal(paid_for_ever, ~exists)
 
 
+def test_totals_of_a_large_random_graph_take_a_moment():
+    """Each step pays 1 and ends one episode in ten, so every total is 10; also of 10⁵ states."""
+    rng, states = np.random.default_rng(0), 100_000
+    mdp = MDP(
+        offsets=np.arange(0, 4 * states + 1, 4),
+        next_states=rng.integers(0, states, 4 * states),
+        probabilities=np.tile([0.3, 0.3, 0.3, 0.1], states),
+        rewards=np.ones(4 * states),
+        terminated=np.tile([False, False, False, True], states),
+        num_actions=1,
+    )
+    totals = undiscounted_totals(mdp, np.ones((states, 1)))
+    np.testing.assert_allclose(totals, 10.0, rtol=1e-12)
+
+
 # ---- limits ------------------------------------------------------------------------------------
 
 
@@ -288,8 +303,9 @@ def test_gamma_outside_its_range_is_refused(gamma):
 
 
 def test_what_double_precision_cannot_hold_is_refused():
-    with pytest.raises(InputError, match="smaller rewards"):
-        optimal(MDP.from_transitions([[[(1.0, 0, 1e308, False)]]]), 0.99)
+    for huge in (1e308, -1e160):  # the square of which is not finite
+        with pytest.raises(InputError, match=r"beyond double precision. Give smaller rewards"):
+            optimal(MDP.from_transitions([[[(1.0, 0, huge, False)]]]), 0.99)
     thirds = MDP.from_transitions([[[(1 / 3, 0, 1.0, False)] * 3]])
     assert optimal(thirds, 1 - 1e-9).q_values[0, 0] == pytest.approx(1e9)
     with pytest.raises(InputError, match=r"too close to 1.*smaller gamma"):

@@ -12,7 +12,7 @@ from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.gridworld import Gridworld, load_map, map_names
-from trdlab.tabular import MDP, ExactTable, exact
+from trdlab.tabular import MDP, ExactTable, exact, optimal
 
 UP, DOWN, LEFT, RIGHT = range(4)
 AXES = [(0, 1), (1, 1), (5, 1), (2, 2), (3, 4), (0, 3)]
@@ -286,3 +286,15 @@ def test_what_is_no_state_is_refused(observations, message):
 def test_a_table_too_large_for_memory_is_refused_with_its_size():
     with pytest.raises(InputError, match=r"N = 1000000000 takes .* GB"):
         exact(Gridworld(load_map("drone")).mdp, TimeAxis(0.95, 10**9))
+
+
+def test_unknown_ties_and_types_are_refused():
+    mdp = Gridworld(load_map("tie")).mdp
+    for solve in (
+        lambda: exact(mdp, TimeAxis(0.9, 2), ties="mixd"),
+        lambda: optimal(mdp, 0.9, ties="mixd"),
+    ):
+        with pytest.raises(InputError, match=r"The ties are 'mixd'\. Did you mean 'mixed'"):
+            solve()
+    with pytest.raises(InputError, match="The dtype is int64"):
+        exact(mdp, TimeAxis(0.9, 2), dtype=np.int64)

@@ -5,29 +5,17 @@ from typing import TYPE_CHECKING
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
-    from trdlab.agents.agent import Agent
-    from trdlab.agents.exact import gridworld_agent, model_agent, tabular_agent
-    from trdlab.agents.naming import find_agent, find_pair
-    from trdlab.agents.runs import run_agent
-
-__all__ = [
-    "Agent",
-    "find_agent",
-    "find_pair",
-    "gridworld_agent",
-    "model_agent",
-    "run_agent",
-    "tabular_agent",
-]
-
-_HOMES = {
-    "Agent": "agent",
-    "find_agent": "naming",
-    "find_pair": "naming",
-    "gridworld_agent": "exact",
-    "model_agent": "exact",
-    "run_agent": "runs",
-    "tabular_agent": "exact",
-}
-
-__getattr__ = lazily(__name__, _HOMES)
+    from trdlab.agents.agent import Agent as Agent
+    from trdlab.agents.exact import gridworld_agent as gridworld_agent
+    from trdlab.agents.exact import tabular_agent as tabular_agent
+    from trdlab.agents.naming import find_agent as find_agent
+    from trdlab.agents.naming import find_pair as find_pair
+else:
+    __getattr__ = lazily(
+        __name__,
+        {
+            "agent": "Agent",
+            "exact": "gridworld_agent tabular_agent",
+            "naming": "find_agent find_pair",
+        },
+    )

@@ -1,7 +1,7 @@
 """The agent that is explained: an estimator, the policy it describes, and where it acts."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from trdlab.agents.models import World
-from trdlab.agents.places import Origin
+from trdlab.agents.places import Origin, look
 from trdlab.environments.batches import Make, in_batches
 from trdlab.environments.interface import Interface
 from trdlab.estimator import Estimator
 from trdlab.policies import Policy
 from trdlab.rollouts.branches import Copying
-from trdlab.rollouts.episodes import Episode, Recording
-from trdlab.rollouts.playing import Progress, Watch, unwatched
+from trdlab.rollouts.episodes import Episode, Recording, collect
+from trdlab.rollouts.playing import Watch, part_of, unwatched
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +30,7 @@ class Agent:
         make: makes the environments that it acts in, from their number and a seed.
         policy: who acts, where that is not the estimator's greedy policy.
         world: the model that the estimator is the exact table of; None if it was learned.
+        is_away: whether it acts elsewhere than in that model, so that nothing is certain there.
         seconds_per_step: how long one of its steps takes as people play, if that is known.
         origin: how a user has named it, and where it acts; None if it was given as an object.
         copying: how much is copied of its states, where nothing else is said.
@@ -41,6 +42,7 @@ class Agent:
     make: Make
     policy: Policy | None = None
     world: World | None = None
+    is_away: bool = False
     seconds_per_step: float | None = None
     origin: Origin | None = None
     copying: Copying = Copying()  # noqa: RUF009  it is frozen
@@ -48,12 +50,7 @@ class Agent:
     @cached_property
     def interface(self) -> Interface:
         """What it sees and does, by the names that it has for that."""
-        environments = self.make(1, 0)
-        try:
-            found = Interface.of(environments)
-        finally:
-            environments.close()
-        return replace(found, action_names=self.action_names)
+        return replace(look(self.make), action_names=self.action_names)
 
     @contextmanager
     def begin(self, *, seed: int, **how: Any) -> Iterator[Recording]:
@@ -63,20 +60,11 @@ class Agent:
             seed: of the environment, and of the actions.
             how: as for `Recording`.
         """
-        environments = self.make(1, seed)
-        try:
+        with closing(self.make(1, seed)) as environments:
             yield Recording(self.estimator, environments, policy=self.policy, seed=seed, **how)
-        finally:
-            environments.close()
 
     def play(
-        self,
-        count: int,
-        *,
-        seed: int,
-        watch: Watch = unwatched,
-        what: str = "episodes",
-        **how: Any,
+        self, count: int, *, seed: int, watch: Watch = unwatched, **how: Any
     ) -> tuple[Episode, ...]:
         """Returns whole episodes that the agent plays, each in an environment of its own.
 
@@ -86,19 +74,15 @@ class Agent:
             count: of the episodes.
             seed: of the environments, and of the actions.
             watch: told how far they are, after every step.
-            what: they are called then.
-            how: as for `Recording`.
+            how: else, as for `collect`.
         """
         played: tuple[Episode, ...] = ()
-
-        def tell(progress: Progress) -> None:
-            watch(replace(progress, finished=len(played) + progress.finished, episodes=count))
-
         for batch, environments in enumerate(in_batches(self.make, count, seed)):
-            own = seed if batch == 0 else _mixed(seed, batch)
-            recording = Recording(self.estimator, environments, policy=self.policy, seed=own, **how)
-            recording.play(watch=tell, what=what)
-            played += recording.episodes()
+            own = int(np.random.SeedSequence([seed, batch]).generate_state(1)[0]) if batch else seed
+            tell = part_of(watch, len(played), count)
+            played += collect(
+                self.estimator, environments, policy=self.policy, seed=own, watch=tell, **how
+            )
         return played
 
     def action(self, name: str) -> str:
@@ -106,7 +90,3 @@ class Agent:
         known = self.action_names
         is_number = name not in known and name.isdecimal() and int(name) < len(known)
         return known[int(name)] if is_number else name
-
-
-def _mixed(seed: int, batch: int) -> int:
-    return int(np.random.SeedSequence([seed, batch]).generate_state(1)[0])

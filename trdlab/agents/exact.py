@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import gymnasium as gym
 
 from trdlab.agents.agent import Agent
-from trdlab.agents.models import GRIDWORLD, TABULAR, Model, gridworld_model, tabular_model
+from trdlab.agents.models import GRIDWORLD, TABULAR, Model, find_model
 from trdlab.agents.places import AXIS, Origin, Place, Where, find_place, look, refuse_arguments
 from trdlab.decomposition import TimeAxis
 from trdlab.environments.interface import Interface
@@ -15,70 +16,39 @@ from trdlab.policies import Memoryless
 from trdlab.rollouts.branches import Copying
 from trdlab.tabular import ExactTable, exact
 
-_COPYING = Copying(episodes=100)
+
+def gridworld_agent(map_name: str, time_axis: TimeAxis, **where: Any) -> Agent:
+    """Returns `exact_agent` of a built-in map or a map file."""
+    return exact_agent(GRIDWORLD + map_name.removeprefix(GRIDWORLD), time_axis, **where)
 
 
-def gridworld_agent(
-    map_name: str,
-    time_axis: TimeAxis,
-    *,
-    env: Where | None = None,
-    env_arguments: Sequence[str] = (),
+def tabular_agent(env_id: str, time_axis: TimeAxis, **where: Any) -> Agent:
+    """Returns `exact_agent` of a Gymnasium environment with a transition table."""
+    return exact_agent(TABULAR + env_id.removeprefix(TABULAR), time_axis, **where)
+
+
+def exact_agent(
+    name: str, time_axis: TimeAxis, *, env: Where | None = None, env_arguments: Sequence[str] = ()
 ) -> Agent:
-    """Returns the exact table of a gridworld as an agent that acts optimally in it.
+    """Returns the exact table of a model with a name as an agent that acts optimally in it.
 
     Args:
-        map_name: a built-in map, or a file, and after commas what to make it with, such as
-            `ledge,slip=0.2`; `gridworld:` may stand before it.
+        name: `gridworld:NAME`, `gridworld:FILE` or `tabular:ENV_ID`, and after commas what to make
+            it with, such as `gridworld:ledge,slip=0.2`.
         time_axis: γ, N and w.
         env: an environment to act in instead, with the same states (see `find_place`).
-        env_arguments: what to make that one with.
+        env_arguments: what to make that one with, as `KEY=VALUE`.
 
     Raises:
-        InputError: a map cannot be read, or the other environment does not fit.
+        InputError: the model cannot be made, or the other environment does not fit.
     """
-    called = GRIDWORLD + map_name.removeprefix(GRIDWORLD)
-    return _named(called, gridworld_model(map_name), time_axis, env, env_arguments)
-
-
-def tabular_agent(
-    env_id: str,
-    time_axis: TimeAxis,
-    *,
-    env: Where | None = None,
-    env_arguments: Sequence[str] = (),
-) -> Agent:
-    """Returns the exact table of an environment's model as an agent that acts optimally in it.
-
-    Args:
-        env_id: a Gymnasium environment with a transition table, and after commas what to make it
-            with, such as `FrozenLake-v1,is_slippery=false`; `tabular:` may stand before it.
-        time_axis: γ, N and w.
-        env: an environment to act in instead, with the same states (see `find_place`).
-        env_arguments: what to make that one with.
-
-    Raises:
-        InputError: there is no such environment, it has no table, or the other one does not fit.
-    """
-    called = TABULAR + env_id.removeprefix(TABULAR)
-    return _named(called, tabular_model(env_id), time_axis, env, env_arguments)
-
-
-def _named(
-    called: str,
-    model: Model,
-    time_axis: TimeAxis,
-    env: Where | None,
-    env_arguments: Sequence[str],
-) -> Agent:
+    model = find_model(name)
     if env is None:
-        refuse_arguments(called, env_arguments)
-    place = find_place(called if env is None else env, env_arguments, time_axis)
+        refuse_arguments(name, env_arguments)
+        return replace(model_agent(model, time_axis), origin=Origin(name, name, (), time_axis))
+    place = find_place(env, env_arguments, time_axis)
     agent = model_agent(model, time_axis, place=place)
-    if not place.is_named:
-        return agent
-    origin = Origin(called, place.name, place.env_arguments, env is not None, time_axis)
-    return replace(agent, origin=origin)
+    return replace(agent, origin=place.origin(name, time_axis, away=True))
 
 
 def model_agent(
@@ -104,7 +74,7 @@ def model_agent(
     if place is None:
         place = find_place(model, (), time_axis)
     else:
-        found = look(place)
+        found = look(place.make)
         own.check_fits(found, place.name)
         if is_numbered(world.action_names):
             own = replace(own, action_names=found.action_names)
@@ -117,5 +87,6 @@ def model_agent(
         make=place.make,
         policy=Memoryless(lambda states: policy[states]),
         world=world,
-        copying=_COPYING,
+        is_away=not place.is_model(solved.mdp),
+        copying=Copying(episodes=100),
     )

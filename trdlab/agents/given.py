@@ -1,6 +1,7 @@
 """Agents made of what is given as an object: a model, a table, an estimator."""
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
@@ -33,10 +34,11 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
     Raises:
         InputError: it is no agent, or does not fit its environment.
     """
+    own = getattr(what.estimator if isinstance(what, Agent) else what, "time_axis", axis)
+    place = None if env is None else find_place(env, env_arguments, own)
     if isinstance(what, Agent):
-        return what if env is None else _moved(what, _place(env, env_arguments, what.estimator))
+        return what if place is None else _moved(what, place)
     if isinstance(what, ExactTable):
-        place = None if env is None else _place(env, env_arguments, what)
         return model_agent(_model_around(what, env), place=place, table=what)
     if isinstance(what, gym.Env):
         raise InputError(
@@ -44,7 +46,6 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
             "Give who acts in it, or solve it with trdlab.solve.",
         )
     if (model := model_of(what)) is not None:
-        place = None if env is None else find_place(env, env_arguments, axis)
         return model_agent(model, axis, place=place)
     missing = [name for name in _NEEDED if not hasattr(what, name)]
     if missing:
@@ -52,45 +53,38 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
             f"This {type(what).__name__} is no agent: it has no {' and no '.join(missing)}.",
             "Give a run's folder, gridworld:NAME, tabular:ENV_ID, a model, or an Estimator.",
         )
-    if env is None:
+    if place is None:
         raise InputError(
             f"Nothing says where this {type(what).__name__} acts.",
             "Give its environment: an id, an environment, or a function that makes one.",
         )
-    return _estimating(what, _place(env, env_arguments, what))
-
-
-def _place(env: Any, env_arguments: Sequence[str], estimator: Estimator) -> Place:
-    return find_place(env, env_arguments, estimator.time_axis)
+    return _estimating(what, place)
 
 
 def _moved(agent: Agent, place: Place) -> Agent:
     """Returns an agent that acts somewhere else."""
-    agent.interface.check_fits(look(place), place.name)
-    return replace(agent, make=place.make, origin=None)
+    agent.interface.check_fits(look(place.make), place.name)
+    of = agent.estimator
+    is_away = isinstance(of, ExactTable) and not place.is_model(of.mdp)
+    return replace(agent, make=place.make, origin=None, is_away=is_away)
 
 
 def _model_around(table: ExactTable, env: Any) -> Model:
     """Returns the model of a table, in the words of an environment that is the same model."""
     found = None if isinstance(env, str) else model_of(env)
-    if found is not None and found.world.mdp.shape == table.mdp.shape:
-        return found
-    known = model_of(table.mdp)
-    assert known is not None  # a model is one
-    return known
+    if found is None or found.world.mdp.shape != table.mdp.shape:
+        found = model_of(table.mdp)
+    assert found is not None  # a model is one
+    return found
 
 
 def _estimating(estimator: Estimator, place: Place) -> Agent:
     """Returns the agent that acts by an estimator's greedy policy."""
-    environments = place.make(1, 0)
-    try:
-        interface = Interface.of(environments)
-        frames, per_second = environments.frame_skip, environments.frames_per_second
+    with closing(place.make(1, 0)) as environments:
+        found = Interface.of(environments)
         first = FrameStack(environments.reset(), environments.stack, environments.padding)
-    finally:
-        environments.close()
     told = np.shape(estimator.decompose(first.observations).components)
-    wanted = (1, len(interface.action_names), estimator.time_axis.num_components)
+    wanted = (1, len(found.action_names), estimator.time_axis.num_components)
     if told != wanted:
         raise InputError(
             f"The estimator decomposes an observation of {place.name} into shape {told}.",
@@ -99,7 +93,7 @@ def _estimating(estimator: Estimator, place: Place) -> Agent:
     return Agent(
         name=type(estimator).__name__,
         estimator=estimator,
-        action_names=interface.action_names,
+        action_names=found.action_names,
         make=place.make,
-        seconds_per_step=frames / per_second if per_second else None,
+        seconds_per_step=found.seconds_per_step,
     )

@@ -39,14 +39,12 @@ class Model:
         world: the model in words.
         starts: `[S]`, how likely episodes begin in each state; None where all begin in one.
         time_limit: its own, if it has one.
-        usual_limit: where it has none.
     """
 
     name: str
     world: World
     starts: FloatArray | None
     time_limit: int | None
-    usual_limit: int
 
     def environments(self, num_envs: int, seed: int, time_axis: TimeAxis) -> ModelEnvironments:
         """Returns episodes of it; a limit that is not its own lets four horizons pass."""
@@ -55,7 +53,7 @@ class Model:
             num_envs,
             seed=seed,
             starts=self.starts,
-            time_limit=self.time_limit or max(self.usual_limit, 4 * time_axis.num_steps),
+            time_limit=self.time_limit or max(_usual_limit(self.world), 4 * time_axis.num_steps),
             action_names=self.world.action_names,
         )
 
@@ -79,25 +77,13 @@ def is_model(name: str) -> bool:
         ) from error
 
 
-def gridworld_model(text: str) -> Model:
-    """Returns the model of a gridworld.
-
-    Args:
-        text: a built-in map or a file, and after commas what to make it with.
+def find_model(name: str) -> Model:
+    """Returns the model of a name, for which `is_model` is true.
 
     Raises:
-        InputError: the map cannot be read, or does not take an argument.
+        InputError: it cannot be made.
     """
-    name, arguments = parse_name(text.removeprefix(GRIDWORLD))
-    for key in arguments:
-        if key not in _OF_GRIDWORLDS:
-            cause = f"A gridworld takes no argument '{key}'."
-            raise InputError(cause, closest(key, _OF_GRIDWORLDS))
-    if not isinstance(arguments.get(_ANYWHERE, False), bool):
-        cause = f"The argument {_ANYWHERE} is '{arguments[_ANYWHERE]}'."
-        raise InputError(cause, "It must be true or false.")
-    env = GridworldEnv(name, **arguments)
-    return _of_gridworld(env.world, say_name(env.world.grid.name, arguments), env.exploring_starts)
+    return tabular_model(name) if name.startswith(TABULAR) else _gridworld_model(name)
 
 
 def tabular_model(text: str) -> Model:
@@ -114,13 +100,17 @@ def tabular_model(text: str) -> Model:
     return _of_world(world, say_name(world.name.rpartition("/")[2], arguments))
 
 
-def find_model(name: str) -> Model:
-    """Returns the model of a name, for which `is_model` is true.
-
-    Raises:
-        InputError: it cannot be made.
-    """
-    return tabular_model(name) if name.startswith(TABULAR) else gridworld_model(name)
+def _gridworld_model(text: str) -> Model:
+    name, arguments = parse_name(text.removeprefix(GRIDWORLD))
+    for key in arguments:
+        if key not in _OF_GRIDWORLDS:
+            cause = f"A gridworld takes no argument '{key}'."
+            raise InputError(cause, closest(key, _OF_GRIDWORLDS))
+    if not isinstance(arguments.get(_ANYWHERE, False), bool):
+        cause = f"The argument {_ANYWHERE} is '{arguments[_ANYWHERE]}'."
+        raise InputError(cause, "It must be true or false.")
+    env = GridworldEnv(name, **arguments)
+    return _of_gridworld(env.world, say_name(env.world.grid.name, arguments), env.exploring_starts)
 
 
 def model_of(what: Any) -> Model | None:
@@ -152,21 +142,16 @@ def model_of(what: Any) -> Model | None:
 
 def _of_gridworld(world: Gridworld, name: str, exploring_starts: bool = False) -> Model:
     running = reachable(world.mdp) & ~world.mdp.terminal_states
-    rows, columns = world.grid.shape
-    return Model(
-        name=name,
-        world=world,
-        starts=running / running.sum() if exploring_starts else None,
-        time_limit=None,
-        usual_limit=max(_LEAST_STEPS, 4 * rows * columns),
-    )
+    return Model(name, world, running / running.sum() if exploring_starts else None, None)
 
 
 def _of_world(world: TabularWorld, name: str) -> Model:
-    return Model(
-        name=name,
-        world=world,
-        starts=world.starts,
-        time_limit=world.time_limit,
-        usual_limit=min(max(_LEAST_STEPS, 4 * world.mdp.num_states), _MOST_STEPS),
-    )
+    return Model(name, world, world.starts, world.time_limit)
+
+
+def _usual_limit(world: World) -> int:
+    """Returns the steps after which episodes are cut off where a model has no limit."""
+    if isinstance(world, Gridworld):
+        rows, columns = world.grid.shape
+        return max(_LEAST_STEPS, 4 * rows * columns)
+    return min(max(_LEAST_STEPS, 4 * world.mdp.num_states), _MOST_STEPS)

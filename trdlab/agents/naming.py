@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from trdlab.agents.agent import Agent
-from trdlab.agents.exact import gridworld_agent, tabular_agent
+from trdlab.agents.exact import exact_agent
 from trdlab.agents.models import GRIDWORLD, TABULAR, is_model
 from trdlab.agents.places import AXIS, Where, changed
 from trdlab.errors import InputError
@@ -48,9 +48,9 @@ def find_agent(
         TrdlabError: a run is torn.
     """
     if is_model(name):
-        of = tabular_agent if name.startswith(TABULAR) else gridworld_agent
+        called = name if name.startswith((GRIDWORLD, TABULAR)) else f"{GRIDWORLD}{name}"
         axis = changed(AXIS, gamma, horizon, width)
-        return of(name, axis, env=env, env_arguments=env_arguments)
+        return exact_agent(called, axis, env=env, env_arguments=env_arguments)
     _refuse_model(name)
     if (gamma, horizon, width) != (None, None, None):
         raise InputError(f"'{name}' {_OWN_AXIS}", _LEAVE_OUT)
@@ -91,8 +91,7 @@ def find_pair(
     gamma: float | None = None,
     horizon: int | None = None,
     width: int | None = None,
-    env: Where | None = None,
-    env_arguments: Sequence[str] = (),
+    **where: Any,
 ) -> tuple[Agent, Agent]:
     """Returns two agents by their names; an exact table takes γ, N and w of a run beside it.
 
@@ -101,22 +100,19 @@ def find_pair(
         gamma: of exact tables, by default that of the run, or 0.95.
         horizon: N of exact tables, by default that of the run, or 4.
         width: w of exact tables, by default that of the run, or 1.
-        env: an environment to act in instead of their own (see `find_place`).
-        env_arguments: what to make that one with, as `KEY=VALUE`.
+        where: both act, as for `find_agent`.
 
     Raises:
         InputError: there is no such agent, or something does not fit it.
     """
-    exact = [is_model(name) for name in names]
-    if (gamma, horizon, width) != (None, None, None) and not any(exact):
+    given = (gamma, horizon, width)
+    if given != (None, None, None) and not any(map(is_model, names)):
         raise InputError(f"Each of the two {_OWN_AXIS}", _LEAVE_OUT)
-    found: dict[int, Agent] = {}
-    for i in sorted((0, 1), key=lambda i: exact[i]):  # runs first
-        axis: dict[str, Any] = {}
-        if exact[i]:
-            own = changed(
-                found[1 - i].estimator.time_axis if found else AXIS, gamma, horizon, width
-            )
-            axis = asdict(own)
-        found[i] = find_agent(names[i], env=env, env_arguments=env_arguments, **axis)
-    return found[0], found[1]
+    found, axis = {}, changed(AXIS, *given)
+    for name in sorted(names, key=is_model):  # runs first
+        if is_model(name):
+            found[name] = find_agent(name, **asdict(axis), **where)
+        else:
+            found[name] = find_agent(name, **where)
+            axis = changed(found[name].estimator.time_axis, *given)
+    return found[names[0]], found[names[1]]

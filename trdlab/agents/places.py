@@ -1,12 +1,17 @@
 """Where an agent acts: its own environments, or others that it is put into."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Self
+
+import numpy as np
+from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 
 from trdlab.agents.models import Model, World, find_model, is_model, model_of
 from trdlab.decomposition import TimeAxis
-from trdlab.environments.arguments import parse_arguments, say_arguments
+from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.batches import Make
 from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.interface import Interface
@@ -16,6 +21,8 @@ from trdlab.tabular import MDP
 
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""
+
+_CHANGING_NOTHING = (TimeLimit, OrderEnforcing, PassiveEnvChecker)
 
 AXIS = TimeAxis(0.95, 4)
 """Of an exact table, where nothing is said."""
@@ -40,24 +47,22 @@ class Origin:
         name: a run, or an exact model.
         env: the environment it acts in.
         env_arguments: what that is made with, as `KEY=VALUE`.
-        away: whether that is not its own.
-        time_axis: of an exact table; a run has its own.
+        time_axis: of an exact table; None of a run, which has its own.
+        away: whether the environment is not its own.
         module: what has to be imported for its environment, if anything.
     """
 
     name: str
     env: str
-    env_arguments: tuple[str, ...] = ()
+    env_arguments: tuple[str, ...]
+    time_axis: TimeAxis | None
     away: bool = False
-    time_axis: TimeAxis | None = None
     module: str = ""
 
     def at(self, other: "Origin") -> Self:
         """Returns the same agent, where another one acts."""
-        away = (other.env, other.env_arguments) != (self.env, self.env_arguments)
-        return replace(
-            self, env=other.env, env_arguments=other.env_arguments, away=self.away or away
-        )
+        away = self.away or (other.env, other.env_arguments) != (self.env, self.env_arguments)
+        return replace(self, env=other.env, env_arguments=other.env_arguments, away=away)
 
     # What follows is the one place outside the command line that knows how it is written there.
 
@@ -87,12 +92,25 @@ class Place:
         name: what it is called.
         env_arguments: what it is made with, as `KEY=VALUE`.
         is_named: whether it can be found again by its name.
+        mdp: the model that it is; None where it carries none.
     """
 
     make: Make
     name: str
     env_arguments: tuple[str, ...] = ()
     is_named: bool = True
+    mdp: MDP | None = None
+
+    def is_model(self, mdp: MDP) -> bool:
+        """Returns whether episodes here go as a model says."""
+        own, names = self.mdp, ("offsets", "next_states", "probabilities", "rewards", "terminated")
+        return own is not None and all(
+            np.array_equal(getattr(own, name), getattr(mdp, name)) for name in names
+        )
+
+    def origin(self, agent: str, axis: TimeAxis | None, **how: Any) -> Origin | None:
+        """Returns how an agent that acts here is named; None where the place has no name."""
+        return Origin(agent, self.name, self.env_arguments, axis, **how) if self.is_named else None
 
 
 def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) -> Place:
@@ -108,43 +126,39 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
     Raises:
         InputError: there is no such model, or it is given arguments that are not in its name.
     """
+    named = isinstance(env, str)
     model = model_of(env) if isinstance(env, Model | World | MDP) else None
     if isinstance(env, str) and is_model(env):
         refuse_arguments(env, env_arguments)
         model = find_model(env)
     if model is not None:
-        return Place(
-            lambda num_envs, seed: model.environments(num_envs, seed, time_axis),
-            env if isinstance(env, str) else model.name,
-            is_named=isinstance(env, str),
-        )
+        make = partial(model.environments, time_axis=time_axis)
+        called = str(env) if named else model.name
+        return Place(make, called, is_named=named, mdp=model.world.mdp)
     source: Any = env
     arguments = parse_arguments(env_arguments)
-    return Place(
-        lambda num_envs, seed: GymEnvironments(
-            source, num_envs, seed=seed, env_arguments=arguments
-        ),
-        source if isinstance(source, str) else "the environment",
-        tuple(env_arguments),
-        is_named=isinstance(source, str),
-    )
+
+    def made(num_envs: int, seed: int) -> GymEnvironments:
+        return GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments)
+
+    called = str(env) if named else "the environment"
+    return Place(made, called, tuple(env_arguments), named, _mdp_of(env))
 
 
-def as_words(env_arguments: Mapping[str, Any]) -> tuple[str, ...]:
-    """Returns arguments of an environment as they are written, `KEY=VALUE`.
-
-    >>> as_words({"is_slippery": False, "map_name": "8x8"})
-    ('is_slippery=false', 'map_name=8x8')
-    """
-    return tuple(say_arguments({key: value}) for key, value in env_arguments.items())
+def _mdp_of(env: Any) -> MDP | None:
+    """Returns the model of an environment, unless a wrapper may change what comes of it."""
+    bare = env
+    while isinstance(bare, _CHANGING_NOTHING):
+        bare = bare.env
+    try:
+        found = model_of(bare) if bare is getattr(bare, "unwrapped", None) else None
+    except InputError:  # it carries something else
+        return None
+    return None if found is None else found.world.mdp
 
 
 def refuse_arguments(name: str, env_arguments: Sequence[str]) -> None:
-    """Refuses arguments of an exact model that do not stand in its name.
-
-    Raises:
-        InputError: there are some.
-    """
+    """Refuses arguments of an exact model that do not stand in its name."""
     if env_arguments:
         raise InputError(
             f"`env_arguments` are for Gymnasium environments, and '{name}' is an exact model.",
@@ -152,10 +166,7 @@ def refuse_arguments(name: str, env_arguments: Sequence[str]) -> None:
         )
 
 
-def look(place: Place) -> Interface:
-    """Returns what is seen and can be done in a place."""
-    environments = place.make(1, 0)
-    try:
+def look(make: Make) -> Interface:
+    """Returns what is seen and can be done in environments, one of which is made."""
+    with closing(make(1, 0)) as environments:
         return Interface.of(environments)
-    finally:
-        environments.close()

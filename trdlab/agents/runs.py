@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from trdlab.agents.agent import Agent
 from trdlab.agents.models import is_model
-from trdlab.agents.places import Origin, Place, Where, find_place
-from trdlab.environments.interface import Interface
+from trdlab.agents.places import Place, Where, find_place, look
 from trdlab.environments.making import check_imported
 from trdlab.environments.naming import is_numbered
 from trdlab.errors import InputError
@@ -50,31 +49,19 @@ def run_agent(
     use_threads(settings)
     estimator = load(path, step)
     place = _place(settings, env, env_arguments)
-    environments = place.make(1, 0)
-    try:
-        found = Interface.of(environments)
-        frames, per_second = environments.frame_skip, environments.frames_per_second
-    finally:
-        environments.close()
+    found, known = look(place.make), interface_of(folder)
     if settings.action_names and env is None:
         found = found.named(settings.action_names)
-    known = interface_of(folder)
     known.check_fits(found, place.name)
     at = "" if step is None else f"@{step}"
-    origin = Origin(
-        f"{path}{at}",
-        place.name,
-        place.env_arguments,
-        away=env is not None,
-        module=settings.env.rpartition(":")[0],
-    )
+    module = settings.env.rpartition(":")[0]
     return Agent(
         name=f"{folder.path.name}{at}",
         estimator=estimator,
         action_names=(known if is_numbered(found.action_names) else found).action_names,
         make=place.make,
-        seconds_per_step=frames / per_second if per_second else None,
-        origin=origin if place.is_named else None,
+        seconds_per_step=found.seconds_per_step,
+        origin=place.origin(f"{path}{at}", None, away=env is not None, module=module),
         copying=_OF_GAMES if _is_atari(settings, env) else Copying(),
     )
 

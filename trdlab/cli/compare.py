@@ -1,12 +1,15 @@
 """`trdlab compare`: what two agents expect at the same states."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from trdlab.cli import common
+
+if TYPE_CHECKING:
+    from trdlab.explanations.comparison.comparison import Comparison
 
 
 def compare(
@@ -87,9 +90,21 @@ def compare(
         common.print_json(found.to_dict())
     else:
         common.print_page(found, details=details)
+        if hint := _further(found):
+            common.print_line(f"Try: {hint}", "dim")
     if out is not None:
         from trdlab.show.plots.comparison import comparison_figure
         from trdlab.show.plots.style import save
 
         save(comparison_figure(found), path)
         errors.print(f"Picture: {path}", soft_wrap=True, markup=False)
+
+
+def _further(found: "Comparison") -> str:
+    """Returns the command that explains the moment at which the two are furthest apart, if any."""
+    visits = found.visits
+    for m in visits.furthest(1):
+        if words := found.words[visits.player[m]]:
+            where = {"--seed": str(visits.seed[m]), "--step": str(visits.step[m])}
+            return common.command(["explain", *words], where)
+    return ""

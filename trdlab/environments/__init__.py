@@ -2,39 +2,25 @@
 
 from typing import TYPE_CHECKING
 
-from trdlab.environments.protocol import (
-    CopyableEnvironments,
-    Environments,
-    NotCopyable,
-    NotParallel,
-    NotReproducible,
-    Padding,
-    Step,
-)
+from trdlab.environments.protocol import CopyableEnvironments as CopyableEnvironments
+from trdlab.environments.protocol import Environments as Environments
+from trdlab.environments.protocol import NotCopyable as NotCopyable
+from trdlab.environments.protocol import NotParallel as NotParallel
+from trdlab.environments.protocol import NotReproducible as NotReproducible
+from trdlab.environments.protocol import Padding as Padding
+from trdlab.environments.protocol import Step as Step
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
-    from trdlab.environments.batches import in_batches
-    from trdlab.environments.gym import GymEnvironments
-    from trdlab.environments.making import make_environment
-
-__all__ = [
-    "CopyableEnvironments",
-    "Environments",
-    "GymEnvironments",
-    "NotCopyable",
-    "NotParallel",
-    "NotReproducible",
-    "Padding",
-    "Step",
-    "in_batches",
-    "make_environment",
-]
-
-_HOMES = {
-    "in_batches": "batches",
-    "GymEnvironments": "gym",
-    "make_environment": "making",
-}
-
-__getattr__ = lazily(__name__, _HOMES)
+    from trdlab.environments.batches import in_batches as in_batches
+    from trdlab.environments.gym import GymEnvironments as GymEnvironments
+    from trdlab.environments.making import make_environment as make_environment
+else:
+    __getattr__ = lazily(
+        __name__,
+        {
+            "batches": "in_batches",
+            "gym": "GymEnvironments",
+            "making": "make_environment",
+        },
+    )

@@ -143,6 +143,7 @@ def _fault(env: Env, rest: Sequence[int]) -> str:
         copy, _ = copied(env, generators(env))
         with kept_luck(1):
             went = trace(copy, rest)
+            copy.close()  # which must not close the original, either
     except NoDeepCopy as error:
         return str(error)
     except Exception as error:  # noqa: BLE001  anything can be raised in another's code
@@ -181,8 +182,7 @@ def _same_every_time(
         renew(own_chance(copy, generators(env)), np.random.SeedSequence(number))
         with kept_luck(number):
             told = trace(copy, actions)
-        if new is not None:
-            copy.close()
+        copy.close()
         return told
 
     first = went(0)

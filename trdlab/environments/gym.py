@@ -141,7 +141,7 @@ class GymEnvironments:
         in new environments, which must show the same. Then every generator of chance that a copy
         holds is seeded anew: `np_random`, and those of NumPy and Python in attributes and in what
         these hold. Where others decide, out of reach, `shared_chance` says so as far as that was
-        seen. The `state_dict` of copies cannot be asked for; close them where they hold something.
+        seen. The `state_dict` of copies cannot be asked for. Close them when they are done with.
 
         Raises:
             NotCopyable: neither gives a copy.

@@ -21,6 +21,7 @@ class Interface:
         space: of what is seen: a frame, or a stack `[k, ...]` of them.
         action_names: A names; where there are none, the numbers that the environment gives them.
         first_action: what the environment itself calls action 0.
+        seconds_per_step: how long a step takes as people play, if that is known.
 
     >>> lake = Interface(gym.spaces.Discrete(16), ("left", "down", "right", "up"))
     >>> lake.seen, lake.done
@@ -32,12 +33,19 @@ class Interface:
     space: gym.spaces.Space[Any]
     action_names: tuple[str, ...]
     first_action: int = 0
+    seconds_per_step: float | None = None
 
     @classmethod
     def of(cls, environments: Environments) -> Self:
         """Returns what is seen and can be done in environments."""
         names = environments.action_names or numbered(environments.num_actions)
-        return cls(observation_space(environments), tuple(names), environments.first_action)
+        rate = environments.frames_per_second
+        return cls(
+            observation_space(environments),
+            tuple(names),
+            environments.first_action,
+            environments.frame_skip / rate if rate else None,
+        )
 
     @property
     def seen(self) -> str:

@@ -1,6 +1,6 @@
 """Assessing an agent: its episodes are played, and what it expected is judged by what came."""
 
-from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,100 +18,13 @@ from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.outcome import Trial
 from trdlab.rollouts.branches import Branches, Branching, Copying, TooFewMoments
 from trdlab.rollouts.counterfactual import compared, try_actions
-from trdlab.rollouts.episodes import Episode
-from trdlab.rollouts.playing import Playing, Progress, Watch, can_be_copied, unwatched
+from trdlab.rollouts.episodes import Episode, distinct
+from trdlab.rollouts.playing import Playing, Watch, part_of, unwatched
 from trdlab.statistics import FEWEST_EPISODES
 from trdlab.tabular import ExactTable
 
 FOLLOWED = 100
 """Steps for which two actions that are tried are followed at least."""
-
-_FIRST = 0.2  # of the episodes, by which it is seen whether all are alike
-
-
-@dataclass(frozen=True)
-class _Judging:
-    """How episodes are played to judge an agent by.
-
-    Args:
-        agent: whom to judge.
-        max_steps: after which an episode is cut off, if not before.
-        seed: of everything.
-        watch: told how far the episodes are, after every step.
-    """
-
-    agent: Agent
-    max_steps: int | None
-    seed: int
-    watch: Watch
-
-    def alike(self, count: int) -> tuple[tuple[Episode, ...], bool]:
-        """Returns episodes by the policy alone, and whether they are too much alike to judge by.
-
-        Where all of the first ones are the same, no more are played, and each is given once.
-        """
-        first = min(count, max(FEWEST_EPISODES, round(_FIRST * count)))
-        played = self.played(0.0, first, of=count)
-        if count > first and len(_different(played)) > 1:
-            played += self.played(0.0, count - first, of=count, before=first)
-        different = _different(played)
-        alike = len(different) < min(FEWEST_EPISODES, count)
-        return (different if alike else played), alike
-
-    def played(
-        self, epsilon: float, count: int, *, of: int, before: int = 0
-    ) -> tuple[Episode, ...]:
-        """Returns `count` episodes out of some, `before` which others have been played."""
-
-        def tell(progress: Progress) -> None:
-            self.watch(replace(progress, finished=progress.finished + before, episodes=of))
-
-        return self.agent.play(
-            count,
-            seed=self.seed + 3 * (before > 0),  # the two seeds between are of the copies
-            epsilon=epsilon,
-            max_steps=self.max_steps,
-            watch=tell,
-            what="episodes with some random actions" if epsilon else "episodes to judge by",
-        )
-
-    def copied(self, copying: Copying, epsilon: float, every: int) -> "_Copied":
-        """Returns what else could have followed, and what follows foils, if there are any.
-
-        Where a few long episodes hide that most are short, moments are copied more often than
-        `every`.
-        """
-        agent = self.agent
-        branching = Branching(agent.estimator, agent.policy, copies=copying.copies)
-
-        def along(every: int, *, foils: bool) -> Branches:
-            environments = agent.make(copying.episodes, self.seed + 1 + foils)
-            try:
-                if not can_be_copied(environments):
-                    raise NotCopyable("Its environments cannot be copied.")
-                return branching.along(
-                    environments,
-                    every=every,
-                    epsilon=epsilon,
-                    max_steps=self.max_steps,
-                    seed=self.seed + 1 + foils,
-                    foils=foils,
-                    watch=self.watch,
-                )
-            except TooFewMoments:
-                if every == 1:
-                    raise
-                return along(every // 2, foils=foils)
-            finally:
-                environments.close()
-
-        try:
-            branches = along(every, foils=False)
-            foils = along(every, foils=True) if len(agent.action_names) > 1 else None
-        except (NotCopyable, NotParallel) as error:
-            return _Copied(lost=f"{error.cause} {LOST}")
-        return _Copied(branches, foils)
-
 
 LOST = (
     "So nothing tells how well anybody could forecast here, nor how well the agent forecasts "
@@ -119,14 +32,7 @@ LOST = (
 )
 """What is lost where the states of an environment cannot be copied."""
 
-
-@dataclass(frozen=True, eq=False)
-class _Copied:
-    """What followed copies, or what is lost where there are none."""
-
-    branches: Branches | None = None
-    foils: Branches | None = None
-    lost: str = ""
+_FIRST = 0.2  # of the episodes, by which it is seen whether all are alike
 
 
 def assess(
@@ -160,38 +66,98 @@ def assess(
     """
     if episodes < 1:
         raise InputError(f"There are {episodes} episodes.", "Ask for at least 1.")
-    judging, chance = _Judging(agent, max_steps, seed, watch), epsilon or 0.0
-    if chance:
-        played = judging.played(chance, episodes, of=episodes)
-        score = score_of(played, seed=seed)
-    else:
-        played, alike = judging.alike(episodes)
-        score = score_of(played, seed=seed)
-        if alike and epsilon is None:
-            chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
-            played = judging.played(chance, episodes, of=episodes)
-    copied = _Copied()
+    judging, chance = _Judging(agent, episodes, max_steps, seed, watch), epsilon or 0.0
+    played, alike = (judging.played(chance), False) if chance else judging.alike()
+    score = score_of(played, seed=seed)
+    if alike and epsilon is None:
+        chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
+        played = judging.played(chance)
+    branches, foils, lost = None, None, ""
     if copying is not None:
         length = float(np.mean([len(episode) for episode in played]))
-        copied = judging.copied(copying, chance, max(1, round(length / copying.moments)))
+        every = max(1, round(length / copying.moments))
+        try:
+            branches = judging.copied(copying, chance, every, foils=False)
+            if len(agent.action_names) > 1:
+                foils = judging.copied(copying, chance, every, foils=True)
+        except (NotCopyable, NotParallel) as error:
+            branches, lost = None, f"{error.cause} {LOST}"
     report = judge(
         agent.estimator.future,
         played,
-        copied.branches,
-        copied.foils,
+        branches,
+        foils,
         score=score,
         seconds_per_step=agent.seconds_per_step,
         seed=seed,
     )
-    return replace(report, lost=copied.lost)
+    return replace(report, lost=lost)
+
+
+@dataclass(frozen=True)
+class _Judging:
+    """How episodes are played to judge an agent by; see `assess`."""
+
+    agent: Agent
+    episodes: int
+    max_steps: int | None
+    seed: int
+    watch: Watch
+
+    def alike(self) -> tuple[tuple[Episode, ...], bool]:
+        """Returns episodes by the policy alone, and whether they are too much alike to judge by.
+
+        Where all of the first ones are the same, no more are played, and each is given once.
+        """
+        first = min(self.episodes, max(FEWEST_EPISODES, round(_FIRST * self.episodes)))
+        played = self.played(0.0, first)
+        if self.episodes > first and len(distinct(played)) > 1:
+            played += self.played(0.0, before=first)
+        different = distinct(played)
+        alike = len(different) < min(FEWEST_EPISODES, self.episodes)
+        return (different if alike else played), alike
+
+    def played(
+        self, epsilon: float, end: int | None = None, before: int = 0
+    ) -> tuple[Episode, ...]:
+        """Returns the episodes up to the `end` of them, but for those that were played `before`."""
+        return self.agent.play(
+            (end or self.episodes) - before,
+            seed=self.seed + 3 * (before > 0),  # the two seeds between are of the copies
+            epsilon=epsilon,
+            max_steps=self.max_steps,
+            watch=part_of(self.watch, before, self.episodes),
+            what="episodes with some random actions" if epsilon else "episodes to judge by",
+        )
+
+    def copied(self, copying: Copying, epsilon: float, every: int, *, foils: bool) -> Branches:
+        """Returns what else could have followed, of the policy's actions or of foils.
+
+        Where a few long episodes hide that most are short, moments are copied more often than
+        `every`.
+        """
+        agent, seed = self.agent, self.seed + 1 + foils
+        branching = Branching(agent.estimator, agent.policy, copying.copies)
+        try:
+            with closing(agent.make(copying.episodes, seed)) as environments:
+                return branching.along(
+                    environments,
+                    every=every,
+                    epsilon=epsilon,
+                    max_steps=self.max_steps,
+                    seed=seed,
+                    foils=foils,
+                    watch=self.watch,
+                )
+        except TooFewMoments:
+            if every == 1:
+                raise
+            return self.copied(copying, epsilon, every // 2, foils=foils)
 
 
 def usual_episodes(agent: Agent) -> int:
-    """Returns by how many episodes an agent is judged, where nothing else is said.
-
-    Of what has to be played that is few; of an exact table it is cheap.
-    """
-    return 50 if agent.world is None else 300
+    """Returns by how many episodes an agent is judged, where nothing else is said."""
+    return 50 if agent.world is None else 300  # of an exact table they are cheap
 
 
 def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:
@@ -212,7 +178,7 @@ def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:
 
 def moment_of_play(agent: Agent, playing: Playing) -> Moment:
     """Returns what the agent expects where the first of its episodes stands."""
-    if agent.world is not None and isinstance(agent.estimator, ExactTable):
+    if agent.world is not None and isinstance(agent.estimator, ExactTable) and not agent.is_away:
         return exact_moment(agent.world, agent.estimator, int(playing.stack.observations[0]))
     decision = playing.decide()
     # findings compare sums, and float32 sums differ in order
@@ -227,13 +193,9 @@ def moment_of_play(agent: Agent, playing: Playing) -> Moment:
 
 
 def judged(moment: Moment, report: CalibrationReport) -> Moment:
-    """Returns a moment with what a report knows of such forecasts.
+    """Returns a moment with what a report on its estimator knows of such forecasts.
 
     That is how far they can be trusted, what they are off by, and whether rewards are of one kind.
-
-    Args:
-        moment: what is expected.
-        report: on the estimator that expects it.
     """
     reliability = report.calibration.reliability
     return replace(
@@ -294,25 +256,13 @@ def try_in_play(
     steps = max(FOLLOWED, agent.estimator.time_axis.num_steps)
     tries = agent.copying.tries if copies is None else copies
     branching = Branching(agent.estimator, agent.policy, tries, steps)
-    numbers = (agent.action_names.index(name) for name in (action, foil))
-    return try_actions(branching, playing, *numbers, seed=seed)
+    one, other = map(agent.action_names.index, (action, foil))
+    return try_actions(branching, playing, one, other, seed=seed)
 
 
 def trial_of(
-    agent: Agent,
-    tried: tuple[Branches, Branches],
-    report: CalibrationReport | None,
-    *,
-    seed: int,
+    agent: Agent, tried: tuple[Branches, Branches], report: CalibrationReport | None, *, seed: int
 ) -> Trial:
     """Returns how two actions differ that an agent tried, held against what it knows otherwise."""
     found = compared(tried, None if report is None else report.seen, seed=seed)
     return Trial(found, agent.action_names, agent.seconds_per_step)
-
-
-def _different(episodes: Sequence[Episode]) -> tuple[Episode, ...]:
-    """Returns the episodes that are not the same as one before."""
-    found: dict[tuple[bytes, ...], Episode] = {}
-    for e in episodes:
-        found.setdefault((e.actions.tobytes(), e.rewards.tobytes(), e.expected.tobytes()), e)
-    return tuple(found.values())

@@ -15,13 +15,13 @@ __all__ = ["counted", "forms_of", "joined"]
 def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     """Returns the forms that a slot `{field:form}` of any sentence can take.
 
-    Numbers: `number` (2.71), `size` (2.71, nothing), `gives` and `pays` (gives 2.71, gives nothing,
-    costs 0.5), `estimate`, `percent`, `chance` (a 5 % chance), `given` (by the user: all its
-    digits), `roots`, `tenths`, `count`, `steps`, `episodes`, `times`, `states`. What is said where
-    a flag asks for it: `average` and `averages` (unless it is sure), `worth`, `net`, `ties`.
-    Time: `when` (a component: now, in 3 steps, in 4 steps or later), `whens` (several), `span`
-    (from one to another), `within` (up to a step: in the first step, within 4 steps), `next` (the
-    next 4 steps), `step`.
+    Numbers: `number` (2.71), `size` (2.71, nothing), `gives`, `pays` and `gains` (gives nothing,
+    costs 0.5, loses 0.5), `estimate`, `percent`, `chance` (a 5 % chance), `given` (by the user: all
+    its digits), `roots`, `tenths`, `count`, `steps`, `episodes`, `times`, `states`. What is said
+    where a flag asks for it: `average` and `averages` (unless it is sure), `worth`, `ties`.
+    Time, where the action is the first step: `when` (a component: at once, 3 steps later, after the
+    first 4 steps), `whens` (several), `span` (from one to another), `within` (up to a step: in the
+    first 4 steps), `first` (so many: the first 4 steps), `step` (of an episode).
     Names: `action`, `names`, `text`.
 
     Args:
@@ -39,9 +39,7 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         return when_of(axis, component) + _played(axis.start(component), seconds)
 
     def within(last_step: int) -> str:
-        if last_step == 0:
-            return "in the first step"
-        return f"within {counted(last_step + 1, 'step')}" + _played(last_step + 1, seconds)
+        return f"in {_first(last_step + 1)}" + _played(last_step + bool(last_step), seconds)
 
     return {
         "action": _of(str),
@@ -50,6 +48,7 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "number": Form(said, float),
         "gives": Form(lambda x, digits: _does(x, digits, "gives"), abs),
         "pays": Form(lambda x, digits: _does(x, digits, "pays"), abs),
+        "gains": Form(lambda x, digits: _does(x, digits, "gains", "loses"), abs),
         "average": _of(lambda is_sure: "" if is_sure else " on average"),
         "averages": _of(lambda are_sure: "" if are_sure else ", on average"),
         "worth": _of(lambda is_discounted: "worth " if is_discounted else ""),
@@ -65,50 +64,49 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "episodes": _of(lambda count: counted(count, "episode")),
         "states": _of(lambda count: counted(count, "state")),
         "ties": _of(lambda is_tied: ", with ties broken as here" if is_tied else ""),
-        "net": _of(lambda is_net: ", costs and rewards together," if is_net else ""),
         "times": _of(lambda count: "once" if count == 1 else f"{count:,} times"),
         "when": _of(when),
         "whens": _of(lambda components: joined(whens_of(axis, components))),
         "span": _of(span),
         "within": _of(within),
-        "next": _of(lambda count: "the next step" if count == 1 else f"the next {count:,} steps"),
+        "first": _of(_first),
         "step": _of(lambda step: f"step {step:,}"),
     }
 
 
 def when_of(axis: TimeAxis, component: int) -> str:
-    """Returns when a component comes, counted from now, as people say it.
+    """Returns when a component comes, counted from the action, as people say it.
 
     >>> axis, grouped = TimeAxis(0.9, 4), TimeAxis(0.9, 2, 2)
     >>> [when_of(axis, i) for i in (0, 1, 3, 4)]
-    ['now', 'in 1 step', 'in 3 steps', 'in 4 steps or later']
+    ['at once', '1 step later', '3 steps later', 'after the first 4 steps']
     >>> [when_of(grouped, i) for i in (0, 1, 2)]
-    ['within 2 steps', 'in 2 to 3 steps', 'in 4 steps or later']
+    ['in the first 2 steps', '2 to 3 steps later', 'after the first 4 steps']
     """
     return span_of(axis, component, component)
 
 
 def span_of(axis: TimeAxis, first: int, last: int) -> str:
-    """Returns when some components in a row come, counted from now, as people say it.
+    """Returns when some components in a row come, counted from the action, as people say it.
 
     >>> axis = TimeAxis(0.9, 4)
     >>> [span_of(axis, *of) for of in ((0, 2), (2, 3), (2, 4), (0, 4))]
-    ['within 3 steps', 'in 2 to 3 steps', 'in 2 steps or later', 'at any time']
+    ['in the first 3 steps', '2 to 3 steps later', 'after the first 2 steps', 'at any time']
     """
     start, steps = axis.start(first), axis.steps(last)
     if steps is None:
-        return f"in {counted(start, 'step')} or later" if start else "at any time"
+        return f"after {_first(start)}" if start else "at any time"
     end = steps[-1]
     if start == end:
-        return "now" if start == 0 else f"in {counted(start, 'step')}"
-    return f"within {end + 1:,} steps" if start == 0 else f"in {start:,} to {end:,} steps"
+        return "at once" if start == 0 else f"{counted(start, 'step')} later"
+    return f"in {_first(end + 1)}" if start == 0 else f"{start:,} to {end:,} steps later"
 
 
 def whens_of(axis: TimeAxis, components: Sequence[int]) -> list[str]:
     """Returns when some components come, those that follow each other told as one.
 
     >>> whens_of(TimeAxis(0.9, 9), [0, 2, 3, 4, 6]), whens_of(TimeAxis(0.9, 2, 2), [0, 1])
-    (['now', 'in 2 to 4 steps', 'in 6 steps'], ['within 4 steps'])
+    (['at once', '2 to 4 steps later', '6 steps later'], ['in the first 4 steps'])
     """
     runs: list[list[int]] = []
     for i in components:
@@ -117,6 +115,10 @@ def whens_of(axis: TimeAxis, components: Sequence[int]) -> list[str]:
         else:
             runs.append([i])
     return [span_of(axis, run[0], run[-1]) for run in runs]
+
+
+def _first(count: int) -> str:
+    return "the first step" if count == 1 else f"the first {count:,} steps"
 
 
 def chance_of(share: float) -> str:
@@ -153,10 +155,10 @@ def _of(show: Callable[..., str]) -> Form:
     return Form(lambda value, _: show(value))
 
 
-def _does(value: float, digits: int, gives: str) -> str:
+def _does(value: float, digits: int, gives: str, costs: str = "costs") -> str:
     if value == 0.0:
         return f"{gives} nothing"
-    return f"{gives if value > 0.0 else 'costs'} {said(abs(value), digits)}"
+    return f"{gives if value > 0.0 else costs} {said(abs(value), digits)}"
 
 
 def _estimate(of: Estimate, digits: int) -> str:

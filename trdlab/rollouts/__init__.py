@@ -5,36 +5,21 @@ from typing import TYPE_CHECKING
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
-    from trdlab.rollouts.branches import Branches, Branching, Copying
-    from trdlab.rollouts.counterfactual import Counterfactual
-    from trdlab.rollouts.episodes import Episode, Recording, collect
-    from trdlab.rollouts.evaluation import Evaluation, evaluate
-    from trdlab.rollouts.playing import Playing
-
-__all__ = [
-    "Branches",
-    "Branching",
-    "Copying",
-    "Counterfactual",
-    "Episode",
-    "Evaluation",
-    "Playing",
-    "Recording",
-    "collect",
-    "evaluate",
-]
-
-_HOMES = {
-    "Branches": "branches",
-    "Branching": "branches",
-    "Copying": "branches",
-    "Counterfactual": "counterfactual",
-    "Episode": "episodes",
-    "Playing": "playing",
-    "Recording": "episodes",
-    "collect": "episodes",
-    "Evaluation": "evaluation",
-    "evaluate": "evaluation",
-}
-
-__getattr__ = lazily(__name__, _HOMES)
+    from trdlab.rollouts.branches import Branching as Branching
+    from trdlab.rollouts.branches import Copying as Copying
+    from trdlab.rollouts.episodes import Episode as Episode
+    from trdlab.rollouts.episodes import Recording as Recording
+    from trdlab.rollouts.episodes import collect as collect
+    from trdlab.rollouts.evaluation import Evaluation as Evaluation
+    from trdlab.rollouts.evaluation import evaluate as evaluate
+    from trdlab.rollouts.playing import Playing as Playing
+else:
+    __getattr__ = lazily(
+        __name__,
+        {
+            "branches": "Branching Copying",
+            "episodes": "Episode Recording collect",
+            "evaluation": "Evaluation evaluate",
+            "playing": "Playing",
+        },
+    )

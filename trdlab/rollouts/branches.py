@@ -1,5 +1,6 @@
 """Branches: what else could have followed, from copies of the states that an agent came to."""
 
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -7,11 +8,11 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
-from trdlab.environments import CopyableEnvironments
+from trdlab.environments import Environments
 from trdlab.errors import InputError
-from trdlab.estimator import Estimator
+from trdlab.estimator import Estimator, Future
 from trdlab.policies import Policy
-from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
+from trdlab.rollouts.playing import Playing, Watch, unwatched
 from trdlab.rollouts.realised import Samples, all_or_none
 
 
@@ -31,6 +32,7 @@ class Branches:
         known: `[M, N+1]`, whether that is known of all n.
         episode: `[M]`, the number of the episode of each, in order.
         num_episodes: E.
+        shared_chance: whether copies were seen to know chance that is not their own.
     """
 
     time_axis: TimeAxis
@@ -40,6 +42,7 @@ class Branches:
     known: BoolArray
     episode: IntArray
     num_episodes: int
+    shared_chance: bool = False
 
     @property
     def copies(self) -> int:
@@ -83,12 +86,11 @@ class Branching:
     """How moments are copied and continued.
 
     Args:
-        estimator: whose policy is followed, and whose predictions are kept; its `future` says
-            which rewards count, and what ends.
+        estimator: whose predictions are kept; its `future` says which rewards count, and what ends.
         policy: who acts, where that is not the estimator's greedy policy.
         copies: n, how often each moment is continued.
-        steps: how many steps a copy is followed; by default those of the explicit components.
-            The residual is known only of moments whose copies have all ended by then.
+        steps: for which a copy is followed, by default those of the explicit components. The
+            residual is known only of moments whose copies have all ended by then.
 
     Raises:
         InputError: there is less than one copy, or the steps do not reach the residual.
@@ -111,7 +113,7 @@ class Branching:
 
     def along(
         self,
-        environments: CopyableEnvironments,
+        environments: Environments,
         *,
         every: int,
         epsilon: float = 0.0,
@@ -123,13 +125,12 @@ class Branching:
         """Plays one episode in each environment, and continues every so manieth moment n times.
 
         The first of them is drawn evenly from the first `every`, so that each step of an episode
-        is as likely as any other.
+        is as likely as any other. After its first action a copy follows the policy alone.
 
         Args:
             environments: E of them; they are reset.
             every: the steps from one moment to the next.
-            epsilon: the chance of a random action in the episodes, as in `collect`; after its first
-                action a copy follows the policy alone.
+            epsilon: the chance of a random action in the episodes, as in `collect`.
             max_steps: after which an episode is cut off; its copies go on.
             seed: of the actions, the moments and the copies.
             foils: whether each copy begins with an action other than the policy's, drawn evenly.
@@ -137,9 +138,10 @@ class Branching:
 
         Raises:
             TooFewMoments: there are fewer than two.
+            NotCopyable: the environments cannot be copied.
         """
-        rng, count = np.random.default_rng(seed), environments.num_envs
-        phase, found = rng.integers(every, size=count), []
+        rng, found = np.random.default_rng(seed), []
+        phase = rng.integers(every, size=environments.num_envs)
         playing = Playing(
             self.estimator,
             environments,
@@ -155,26 +157,23 @@ class Branching:
             if len(due):
                 own, actions = turn.own[due], turn.actions[due]
                 first = _others(own, environments.num_actions, rng) if foils else actions
-                found.append(self._continued(playing, due, first, playing.steps, rng))
+                found.append(self._continued(playing, due, first, rng))
             playing.take(turn.actions)
-            watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
+            watch(playing.progress(what))
         copied = sum(len(part.actions) for part in found)
         if copied < 2:
             raise TooFewMoments(
                 f"The episodes are so short that there are moments in them: {copied}.",
                 "Copy moments more often, or play more episodes.",
             )
-        return self._joined(found, count)
+        return _joined(found)
 
-    def at(
-        self, playing: Playing, action: int, *, age: int | None = None, seed: int = 0
-    ) -> Branches:
+    def at(self, playing: Playing, action: int, *, seed: int = 0) -> Branches:
         """Continues the first episode n times from where it stands, beginning with an action.
 
         Args:
             playing: where it stands; it is left as it is.
             action: the first one of every copy.
-            age: the steps since the episode began; by default those that were played.
             seed: of the copies.
 
         Raises:
@@ -186,27 +185,23 @@ class Branching:
             raise InputError(
                 f"There is no action {action}.", f"They run from 0 to {num_actions - 1}."
             )
-        rng, age = np.random.default_rng(seed), playing.steps if age is None else age
-        found = self._continued(playing, np.array([0]), np.array([action]), age, rng)
-        return self._joined([found], 1)
+        rng = np.random.default_rng(seed)
+        return _joined([self._continued(playing, np.array([0]), np.array([action]), rng)])
 
     def _continued(
-        self,
-        playing: Playing,
-        moments: IntArray,
-        first: IntArray,
-        age: int,
-        rng: np.random.Generator,
+        self, playing: Playing, moments: IntArray, first: IntArray, rng: np.random.Generator
     ) -> Branches:
         """Continues the `moments [M]` with the actions `first [M]`."""
-        axis, copies = self.estimator.time_axis, self.copies
+        axis, future = self.estimator.time_axis, self.estimator.future
         here = np.searchsorted(np.flatnonzero(playing.running), moments)  # [M], of those asked
         predicted = playing.decide().decomposition.components[here, first]  # [M, N+1]
-        which, length = np.repeat(moments, copies), self.steps or axis.num_steps  # [M·n]
+        which, length = np.repeat(moments, self.copies), self.steps or axis.num_steps  # [M·n]
         branch = playing.branch(which, seed=int(rng.integers(2**31)), rng=rng, max_steps=length)
-        rewards, ended = self._followed(branch, np.repeat(first, copies), length)
-        observed, known = _on_axis(axis, rewards, ended, self._time_limit(playing), age)
-        shape = (len(moments), copies, axis.num_components)
+        with closing(branch.environments):
+            rewards, ended = _followed(branch, np.repeat(first, self.copies), length, future)
+        limit = None if future.time_limit_ends else playing.environments.time_limit
+        observed, known = _on_axis(axis, rewards, ended, limit, playing.steps)
+        shape = (len(moments), self.copies, axis.num_components)
         return Branches(
             time_axis=axis,
             actions=first,
@@ -215,41 +210,38 @@ class Branching:
             known=np.asarray(known.reshape(shape).all(axis=1)),
             episode=moments,
             num_episodes=playing.environments.num_envs,
+            shared_chance=getattr(branch.environments, "shared_chance", False),
         )
 
-    def _time_limit(self, playing: Playing) -> int | None:
-        """Returns the steps beyond which nothing can be known."""
-        own = playing.environments.time_limit
-        return None if self.estimator.future.time_limit_ends else own
 
-    def _followed(
-        self, branch: Playing, actions: IntArray, length: int
-    ) -> tuple[FloatArray, IntArray]:
-        """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, the ends.
+def _followed(
+    branch: Playing, actions: IntArray, length: int, future: Future
+) -> tuple[FloatArray, IntArray]:
+    """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, the ends.
 
-        An end is the number of steps until nothing is left to come; −1 where none was seen.
-        """
-        count, future = len(actions), self.estimator.future
-        rewards, ended = np.zeros((count, length)), np.full(count, -1)
-        while branch.running.any():
-            running, t = branch.running, branch.steps
-            step = branch.take(branch.turn().actions if t else actions)
-            rewards[running, t] = future.count(step.rewards)[running]
-            end = running & future.ends(step.terminated, step.truncated, step.life_lost)
-            ended[end] = t + 1
-            rewards[running & step.truncated & ~end, t + 1 :] = np.nan
-            branch.stop(end)
-        return rewards, ended
+    An end is the number of steps until nothing is left to come; −1 where none was seen.
+    """
+    rewards, ended = np.zeros((len(actions), length)), np.full(len(actions), -1)
+    while branch.running.any():
+        running, t = branch.running, branch.steps
+        step = branch.take(branch.turn().actions if t else actions)
+        rewards[running, t] = future.count(step.rewards)[running]
+        end = running & future.ends(step.terminated, step.truncated, step.life_lost)
+        ended[end] = t + 1
+        rewards[running & step.truncated & ~end, t + 1 :] = np.nan
+        branch.stop(end)
+    return rewards, ended
 
-    def _joined(self, found: list[Branches], num_episodes: int) -> Branches:
-        """Returns the moments of all times, in the order of their episodes."""
-        order = np.argsort(np.concatenate([part.episode for part in found]), kind="stable")
-        names = ("actions", "predicted", "observed", "known", "episode")
-        arrays: dict[str, Any] = {
-            name: np.concatenate([getattr(part, name) for part in found])[order] for name in names
-        }
-        arrays["known"] = all_or_none(arrays["known"])
-        return replace(found[0], **arrays, num_episodes=num_episodes)
+
+def _joined(found: list[Branches]) -> Branches:
+    """Returns the moments of all times, in the order of their episodes."""
+    order = np.argsort(np.concatenate([part.episode for part in found]), kind="stable")
+    names = ("actions", "predicted", "observed", "known", "episode")
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in found])[order] for name in names
+    }
+    arrays["known"] = all_or_none(arrays["known"])
+    return replace(found[0], **arrays)
 
 
 def _others(actions: IntArray, num_actions: int, rng: np.random.Generator) -> IntArray:

@@ -19,7 +19,7 @@ class Seen:
     Args:
         range: `[2, N+2]`, the least and the most that ever came of every component, and of all
             together.
-        chance: whether copies of a state ever went differently; None where none were made.
+        chance: whether a state ever led to different things; None where that was not looked at.
     """
 
     range: FloatArray
@@ -54,26 +54,16 @@ class Counterfactual:
 
 
 def try_actions(
-    branching: Branching,
-    playing: Playing,
-    action: int,
-    foil: int,
-    *,
-    age: int | None = None,
-    seed: int = 0,
+    branching: Branching, playing: Playing, action: int, foil: int, *, seed: int = 0
 ) -> tuple[Branches, Branches]:
-    """Tries two actions, each from copies of the same state, and follows the policy after them.
+    """Returns what follows two actions, each from copies of the same state.
 
     Args:
         branching: the estimator, and how many copies to make.
         playing: where the state is: that of the first episode.
         action: the number of one action.
         foil: the number of the other.
-        age: the steps since the episode began; by default those that were played.
         seed: of the copies.
-
-    Returns:
-        What followed the one and the other.
 
     Raises:
         InputError: there is no such action, or both are the same.
@@ -82,10 +72,7 @@ def try_actions(
     if action == foil:
         raise InputError(f"Action and foil are both {action}.", "Give two different actions.")
     one, other = np.random.SeedSequence(seed).generate_state(2).tolist()
-    return (
-        branching.at(playing, action, age=age, seed=one),
-        branching.at(playing, foil, age=age, seed=other),
-    )
+    return branching.at(playing, action, seed=one), branching.at(playing, foil, seed=other)
 
 
 def compared(
@@ -107,7 +94,7 @@ def compared(
     said = np.stack([_with_sum(branches.predicted[0], whole) for branches in tried])  # [2, N+2]
     everything = np.concatenate([one, other, said, *([] if seen is None else [seen.range])])
     same = not any(np.nan_to_num(np.ptp(of, axis=0)).any() for of in (one, other))
-    chance = None if seen is None else seen.chance
+    chance = any(branches.shared_chance for branches in tried) or (seen and seen.chance)
     if same and (chance is False or (chance is None and np.nan_to_num(one + other).any())):
         value = one.mean(axis=0) - other.mean(axis=0)
         observed = Estimates(value, value, value)

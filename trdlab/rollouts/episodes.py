@@ -1,5 +1,6 @@
 """Episodes: what an agent predicted at every step, and what then happened."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +12,7 @@ from trdlab.environments import Environments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.policies import Policy
-from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
+from trdlab.rollouts.playing import Playing, Watch, unwatched
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,16 +21,15 @@ class Episode:
 
     Args:
         decomposition: `[T, A, N+1]`, of every action.
-        expected: `[T+1, N+1]`, the components of the described policy's own action (their mean,
-            where it draws), at every observation from the first one to the true last one.
+        expected: `[T+1, N+1]`, what is expected of the policy's own action (the mean, where it
+            draws), at every observation from the first one to the true last one.
         actions: `[T]`.
         rewards: `[T]`, as the estimator counts them.
         life_lost: `[T]`, whether a life was lost and the episode went on.
         ends: `[T]`, whether nothing is left to come after a step, as the estimator's future says.
         terminated: whether the episode ended for good; otherwise it was truncated.
-        random: `[T + N·w]`, whether the action was a random one instead of the policy's. It goes
-            on past the end as if there were more steps, so that what is left out because of it
-            does not depend on how long the episode was.
+        random: `[T + N·w]`, whether the action was a random one instead of the policy's; also past
+            the end, so that what is left out because of it does not depend on the length.
         epsilon: the chance of a random action.
         time_limit: the steps after which every such episode is truncated, if that is known.
     """
@@ -66,10 +66,9 @@ class Recording:
         estimator: whose predictions are kept; its `future` says which rewards count, and what ends.
         environments: E of them; they are reset.
         policy: who acts, where that is not the estimator's greedy policy.
-        epsilon: the chance of a random action instead. Random actions lead to more states; what
-            follows one is not held against what was predicted before it.
-        max_steps: after which an episode is truncated, if the environment has not ended it before;
-            it is a `time_limit` like that of an environment.
+        epsilon: the chance of a random action instead. What follows one is not held against what
+            was predicted before it.
+        max_steps: after which an episode is truncated, if not before, as by an environment's limit.
         seed: of the actions.
 
     Attributes:
@@ -91,8 +90,6 @@ class Recording:
     ) -> None:
         if not 0.0 <= epsilon < 1.0:
             raise InputError(f"ε is {epsilon}.", "It must be at least 0 and less than 1.")
-        if max_steps is not None and max_steps < 1:
-            raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
         self._estimator, self._epsilon = estimator, epsilon
         self._chance = np.random.default_rng([seed, 1])
         self.playing = Playing(
@@ -118,10 +115,9 @@ class Recording:
             watch: told how far the episodes are, after every step.
             what: they are called then.
         """
-        playing, count = self.playing, len(self._logs)
-        while playing.running.any() and playing.steps != until:
+        while self.playing.running.any() and self.playing.steps != until:
             self._take()
-            watch(Progress(what, int(count - playing.running.sum()), count, playing.steps))
+            watch(self.playing.progress(what))
 
     def play_to(self, step: int) -> None:
         """Plays the first episode to a step, at which it is paused.
@@ -161,16 +157,24 @@ class Recording:
         limits = [limit for limit in (own, self.playing.max_steps) if limit is not None]
         coins = self._chance.random((len(self._logs), axis.num_steps)) < self._epsilon  # [E, N·w]
         return tuple(
-            _episode(
-                log,
-                self._last[env],
-                coins[env],
-                time_axis=axis,
-                terminated=bool(self._terminated[env]),
-                epsilon=self._epsilon,
-                time_limit=min(limits, default=None),
-            )
-            for env, log in enumerate(self._logs)
+            self._episode(env, coins[env], min(limits, default=None)) for env in range(len(coins))
+        )
+
+    def _episode(self, env: int, coins: BoolArray, time_limit: int | None) -> Episode:
+        """Returns the episode of an environment, of its log and of coins for past its end."""
+        columns = [np.stack(column) for column in zip(*self._logs[env], strict=True)]
+        components, expected, actions, rewards, life_lost, ends, random = columns
+        return Episode(
+            decomposition=RewardDecomposition(components, self._estimator.time_axis),
+            expected=np.concatenate([expected, self._last[env][None]]).astype(np.float64),
+            actions=actions,
+            rewards=rewards.astype(np.float64),
+            life_lost=life_lost,
+            ends=ends,
+            terminated=bool(self._terminated[env]),
+            random=np.concatenate([random, coins]),
+            epsilon=self._epsilon,
+            time_limit=time_limit,
         )
 
 
@@ -182,7 +186,7 @@ def collect(
     what: str = "episodes",
     **how: Any,
 ) -> tuple[Episode, ...]:
-    """Plays one episode in each environment to its end, by the policy that the estimator describes.
+    """Plays one episode in each of E environments to its end, and returns them in that order.
 
     Args:
         estimator: whose predictions are kept.
@@ -190,9 +194,6 @@ def collect(
         watch: told how far the episodes are, after every step.
         what: they are called then.
         how: as for `Recording`.
-
-    Returns:
-        E episodes, in the order of the environments.
 
     Raises:
         InputError: ε is outside [0, 1), or there is not a single step.
@@ -202,24 +203,9 @@ def collect(
     return recording.episodes()
 
 
-def _episode(
-    log: list[tuple[Any, ...]],
-    last: FloatArray,
-    coins: BoolArray,
-    *,
-    time_axis: TimeAxis,
-    **rest: Any,
-) -> Episode:
-    """Returns the episode of a log, of the last expectation `[N+1]` and coins for past its end."""
-    columns = [np.stack(column) for column in zip(*log, strict=True)]
-    components, expected, actions, rewards, life_lost, ends, random = columns
-    return Episode(
-        decomposition=RewardDecomposition(components, time_axis),
-        expected=np.concatenate([expected, last[None]]).astype(np.float64),
-        actions=actions,
-        rewards=rewards.astype(np.float64),
-        life_lost=life_lost,
-        ends=ends,
-        random=np.concatenate([random, coins]),
-        **rest,
-    )
+def distinct(episodes: Sequence[Episode]) -> tuple[Episode, ...]:
+    """Returns the episodes that are not the same as one before."""
+    found: dict[tuple[bytes, ...], Episode] = {}
+    for e in episodes:
+        found.setdefault((e.actions.tobytes(), e.rewards.tobytes(), e.expected.tobytes()), e)
+    return tuple(found.values())

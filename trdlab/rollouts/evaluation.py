@@ -8,10 +8,9 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.environments import Environments
-from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.policies import Policy, acting
-from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
+from trdlab.rollouts.playing import Playing, Watch, unwatched
 from trdlab.statistics import Estimate, bootstrap, interquartile_mean
 
 
@@ -87,8 +86,6 @@ def evaluate(
     Raises:
         InputError: `who` is neither policy nor estimator, or there is not a single step.
     """
-    if max_steps is not None and max_steps < 1:
-        raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
     count = environments.num_envs
     playing = Playing(
         None,
@@ -107,8 +104,7 @@ def evaluate(
         returns[running] += step.rewards[running]
         lengths[running] += 1
         truncated |= playing.finished & ~step.terminated
-        finished = int(count - playing.running.sum())
-        watch(Progress("episodes to score", finished, count, playing.steps))
+        watch(playing.progress("episodes to score"))
     return Evaluation(returns, lengths, truncated, epsilon, seed, max_steps)
 
 

@@ -1,14 +1,14 @@
 """Playing: what an agent decides, step by step, and where that leads."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, TypeGuard
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.environments import CopyableEnvironments, Environments, NotCopyable, Step
+from trdlab.environments import Environments, NotCopyable, Step
 from trdlab.environments.faults import blamed
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
@@ -42,6 +42,11 @@ Watch = Callable[[Progress], None]
 
 def unwatched(progress: Progress) -> None:
     """Tells nobody."""
+
+
+def part_of(watch: Watch, before: int, episodes: int) -> Watch:
+    """Returns who is told of episodes as a part of more, some of which were played before."""
+    return lambda now: watch(replace(now, finished=before + now.finished, episodes=episodes))
 
 
 def usual_limit(axis: TimeAxis) -> int:
@@ -115,7 +120,7 @@ class Playing:
         steps: how many have been taken.
 
     Raises:
-        InputError: there are fewer than no steps.
+        InputError: there is not a single step.
     """
 
     def __init__(
@@ -131,8 +136,8 @@ class Playing:
         stack: FrameStack | None = None,
         memory: Any = None,
     ) -> None:
-        if max_steps is not None and max_steps < 0:
-            raise InputError(f"An episode has {max_steps} steps.", "Ask for at least 1.")
+        if max_steps is not None and max_steps < 1 and stack is None:
+            raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
         self.environments, self.max_steps, self.steps = environments, max_steps, 0
         self._begins = stack is None
         if stack is None:
@@ -183,7 +188,7 @@ class Playing:
         self.steps += 1
         over = step.ended | (self.steps == self.max_steps)  # [B]
         self.finished, self.running = self.running & over, self.running & ~over
-        self._last = _last_observations(self.stack, step, self.finished)
+        self._last = self._last_seen(step.frames)
         self.stack.push(step.following, step.ended)
         self._decision, self._turn, self._begins = None, None, False
         return step
@@ -191,6 +196,11 @@ class Playing:
     def stop(self, where: BoolArray) -> None:
         """Plays no further `where [B]`."""
         self.running = self.running & ~where
+
+    def progress(self, what: str) -> Progress:
+        """Returns how far the episodes are, and what they are played for."""
+        count = len(self.running)
+        return Progress(what, count - int(self.running.sum()), count, self.steps)
 
     def at_last(self) -> Decision:
         """Returns what is expected at the true last observations of the finished episodes."""
@@ -217,7 +227,7 @@ class Playing:
         Raises:
             NotCopyable: the environments cannot be copied.
         """
-        if not can_be_copied(self.environments):
+        if not hasattr(self.environments, "branch"):
             raise NotCopyable("The environments cannot be copied.", "Give them a method branch.")
         self.turn()
         stack = FrameStack(self.stack.newest[which], self.stack.size, self.stack.padding)
@@ -237,6 +247,13 @@ class Playing:
             raise TypeError("Nobody was given who expects anything.")
         return self._estimator.decompose(observations)
 
+    def _last_seen(self, frames: Any) -> Any:
+        """Returns the true last observations of what has finished, from `frames [B, ...]`."""
+        last = frames[self.finished]
+        if self.stack.size is None:
+            return last
+        return np.concatenate([self.stack.frames[self.finished, 1:], last[:, None]], axis=1)
+
     def _ask(self, policy: Policy, observations: Any) -> FloatArray:
         """Returns how likely the policy takes each action `[R, A]`, and lets it remember."""
         memory = rows(self._memory, self.running[self._asked])
@@ -246,27 +263,8 @@ class Playing:
         return likely
 
 
-def can_be_copied(environments: Environments) -> TypeGuard[CopyableEnvironments]:
-    """Returns whether copies of environments can be asked for; each of them may still refuse."""
-    return hasattr(environments, "branch")
-
-
 def _drawn(probabilities: FloatArray, level: FloatArray) -> IntArray:
     """Returns `[R]`: the action of each that a level in [0, 1) falls to."""
     cumulative = probabilities.cumsum(axis=1)
     level = level * cumulative[:, -1]  # which may not be quite 1
     return np.asarray((cumulative <= level[:, None]).sum(axis=1))
-
-
-def _last_observations(stack: FrameStack, step: Step, where: BoolArray) -> Any:
-    """Returns `[≤ B, ...]`: the true last observations of the episodes that end `where [B]`.
-
-    Args:
-        stack: what was seen before the step.
-        step: what it led to.
-        where: `[B]`.
-    """
-    frames = step.frames[where]
-    if stack.size is None:
-        return frames
-    return np.concatenate([stack.frames[where, 1:], frames[:, None]], axis=1)

@@ -1,6 +1,7 @@
 """What is rendered of agents: explanations, calibrations and comparisons, as pages and as data."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,10 @@ from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison import claims as comparing
 from trdlab.explanations.comparison.comparison import SIDES, Comparison
 from trdlab.explanations.episode.played import Played
-from trdlab.explanations.explanation import Explanation
+from trdlab.explanations.explanation import Explanation, Part
+from trdlab.explanations.moment.moment import Choice
 from trdlab.explanations.rules import plain_data
+from trdlab.explanations.words import counted
 from trdlab.formatting import decimals_for, number
 from trdlab.show.data import actions_data, axis_data, data, told_data
 from trdlab.show.document import Document, axis_words, document
@@ -34,7 +37,7 @@ def _(explanation: Explanation) -> Document:
         heading=" · ".join(heading),
         setting=(*axis_words(explanation.time_axis), *_played(explanation)),
         scene=None if state is None or agent.world is None else scene_of(agent.world, state),
-        table=None if choice is None else action_table(choice),
+        table=None if choice is None else action_table(_shown(choice, explanation.parts)),
         answer=tuple(claim.sentence for claim in explanation.answer),
         sections=explanation.sections,
         folded=not explanation.parts,
@@ -53,14 +56,19 @@ def _(report: CalibrationReport) -> Document:
 
 @document.register
 def _(comparison: Comparison) -> Document:
-    named = zip(SIDES, comparison.names, strict=True)
+    axis, seconds = axis_words(comparison.time_axis), _seconds(comparison.seconds_per_step)
     return Document(
-        heading=" · ".join(f"{side}: {name}" for side, name in named),
-        setting=(*axis_words(comparison.time_axis), *_seconds(comparison.seconds_per_step)),
-        table=_means(comparison),
+        heading=" · ".join(comparison.titles),
+        setting=(*axis, *_where(comparison), *seconds),
+        table=_means(comparison) if comparison.visits.apart.any() else None,
         answer=tuple(claim.sentence for claim in comparing.in_brief(comparison)),
         sections=comparing.sections(comparison),
     )
+
+
+def _shown(choice: Choice, parts: tuple[Part, ...]) -> Choice:
+    """Returns whose actions are shown; the difference of two only to who asks for a contrast."""
+    return choice if not parts or "contrast" in parts else replace(choice, foil=None)
 
 
 def _played(explanation: Explanation) -> list[str]:
@@ -72,8 +80,15 @@ def _played(explanation: Explanation) -> list[str]:
         cut.add(story.played.episode.time_limit)
     words = _seconds(explanation.agent.seconds_per_step)
     if explanation.max_steps in cut - {None}:
-        words.append(f"episodes are cut off after {explanation.max_steps:,} steps")
+        words.append(f"episodes are cut off after {counted(explanation.max_steps or 0, 'step')}")
     return words
+
+
+def _where(comparison: Comparison) -> list[str]:
+    """Returns where both act, if that has a name."""
+    env, *arguments = comparison.place[1::2] or ("",)
+    made = f" with {', '.join(arguments)}" if arguments else ""
+    return [f"both act in {env}{made}"] if env else []
 
 
 def _seconds(seconds: float | None) -> list[str]:
@@ -133,12 +148,14 @@ def _(comparison: Comparison) -> dict[str, Any]:
         "agents": {
             side: {
                 "name": comparison.names[i],
+                "words": list(comparison.words[i]),
                 "future": comparison.futures[i].to_dict(),
                 "mean": plain_data(_of_side(comparison.means, i)),
                 "calibration": None if report is None else data(report),
             }
             for i, (side, report) in enumerate(zip(SIDES, comparison.reports, strict=True))
         },
+        "place": list(comparison.place),
         "seconds_per_step": comparison.seconds_per_step,
         "max_steps": comparison.max_steps,
         "time_axis": axis_data(comparison.time_axis),
@@ -147,12 +164,29 @@ def _(comparison: Comparison) -> dict[str, Any]:
         "cut_off": visits.cut,
         "states": len(visits),
         **{name: plain_data(getattr(comparison, name)) for name in found},
+        "furthest": [_state(comparison, m) for m in visits.furthest(comparing.FURTHEST)],
         **told_data(comparing.in_brief(comparison), comparing.sections(comparison)),
     }
 
 
 def _of_side(means: Estimates, side: int) -> Estimates:
     return Estimates(means.value[side], means.low[side], means.high[side])
+
+
+def _state(comparison: Comparison, m: int) -> dict[str, Any]:
+    """Returns a state, and what each of the two would do there and expects of that."""
+    visits, names = comparison.visits, comparison.action_names
+    told = {
+        side: {"action": names[visits.actions[i, m]], "components": visits.expected[i, m].tolist()}
+        for i, side in enumerate(SIDES)
+    }
+    return {
+        "player": SIDES[visits.player[m]],
+        "seed": int(visits.seed[m]),
+        "step": int(visits.step[m]),
+        "distance": float(visits.apart[m]),
+        **told,
+    }
 
 
 def _moment(explanation: Explanation) -> dict[str, Any] | None:

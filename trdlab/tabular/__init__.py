@@ -3,68 +3,46 @@
 from typing import TYPE_CHECKING
 
 from trdlab.lazy import lazily
-from trdlab.tabular.mdp import MDP
-from trdlab.tabular.solve import Solution, Ties, evaluate, improved, optimal
-from trdlab.tabular.table import ExactTable, exact
-from trdlab.tabular.totals import undiscounted_totals
+from trdlab.tabular.mdp import MDP as MDP
+from trdlab.tabular.solve import Solution as Solution
+from trdlab.tabular.solve import Ties as Ties
+from trdlab.tabular.solve import evaluate as evaluate
+from trdlab.tabular.solve import improved as improved
+from trdlab.tabular.solve import optimal as optimal
+from trdlab.tabular.table import ExactTable as ExactTable
+from trdlab.tabular.table import exact as exact
+from trdlab.tabular.totals import undiscounted_totals as undiscounted_totals
 
 if TYPE_CHECKING:
-    from trdlab.tabular.environments import from_environment
-    from trdlab.tabular.episodes import ModelEnvironments
-    from trdlab.tabular.learned import LearnedTable
-    from trdlab.tabular.learning import learn
-    from trdlab.tabular.models import from_arrays
-    from trdlab.tabular.named import Coordinate, TabularWorld
-    from trdlab.tabular.operator import OperatorTable, operator_table
-    from trdlab.tabular.toytext import make_world, tabular_world
-    from trdlab.tabular.uncertainty import Spread, outcomes, spread
-    from trdlab.tabular.windows import WindowBuilder, Windows
-
-__all__ = [
-    "MDP",
-    "Coordinate",
-    "ExactTable",
-    "LearnedTable",
-    "ModelEnvironments",
-    "OperatorTable",
-    "Solution",
-    "Spread",
-    "TabularWorld",
-    "Ties",
-    "WindowBuilder",
-    "Windows",
-    "evaluate",
-    "exact",
-    "from_arrays",
-    "from_environment",
-    "improved",
-    "learn",
-    "make_world",
-    "operator_table",
-    "optimal",
-    "outcomes",
-    "spread",
-    "tabular_world",
-    "undiscounted_totals",
-]
-
-_HOMES = {
-    "Coordinate": "named",
-    "TabularWorld": "named",
-    "from_arrays": "models",
-    "from_environment": "environments",
-    "make_world": "toytext",
-    "tabular_world": "toytext",
-    "ModelEnvironments": "episodes",
-    "LearnedTable": "learned",
-    "learn": "learning",
-    "OperatorTable": "operator",
-    "operator_table": "operator",
-    "Spread": "uncertainty",
-    "outcomes": "uncertainty",
-    "spread": "uncertainty",
-    "WindowBuilder": "windows",
-    "Windows": "windows",
-}
-
-__getattr__ = lazily(__name__, _HOMES)
+    from trdlab.tabular.environments import from_environment as from_environment
+    from trdlab.tabular.episodes import ModelEnvironments as ModelEnvironments
+    from trdlab.tabular.learned import LearnedTable as LearnedTable
+    from trdlab.tabular.learning import learn as learn
+    from trdlab.tabular.models import from_arrays as from_arrays
+    from trdlab.tabular.named import Coordinate as Coordinate
+    from trdlab.tabular.named import TabularWorld as TabularWorld
+    from trdlab.tabular.operator import OperatorTable as OperatorTable
+    from trdlab.tabular.operator import operator_table as operator_table
+    from trdlab.tabular.toytext import make_world as make_world
+    from trdlab.tabular.toytext import tabular_world as tabular_world
+    from trdlab.tabular.uncertainty import Spread as Spread
+    from trdlab.tabular.uncertainty import outcomes as outcomes
+    from trdlab.tabular.uncertainty import spread as spread
+    from trdlab.tabular.windows import WindowBuilder as WindowBuilder
+    from trdlab.tabular.windows import Windows as Windows
+else:
+    __getattr__ = lazily(
+        __name__,
+        {
+            "environments": "from_environment",
+            "episodes": "ModelEnvironments",
+            "learned": "LearnedTable",
+            "learning": "learn",
+            "models": "from_arrays",
+            "named": "Coordinate TabularWorld",
+            "operator": "OperatorTable operator_table",
+            "toytext": "make_world tabular_world",
+            "uncertainty": "Spread outcomes spread",
+            "windows": "WindowBuilder Windows",
+        },
+    )

@@ -7,7 +7,7 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
-from trdlab.tabular.mdp import MDP
+from trdlab.tabular.mdp import MDP, as_flags
 from trdlab.tabular.models import check_finite
 
 
@@ -69,7 +69,7 @@ def _check_table(table: Any, name: str) -> None:
     """Refuses a `P` table that cannot be read, or leads to a state that does not exist."""
     try:
         entries = [
-            (state, action, float(probability), float(following), float(reward), bool(ends))
+            (state, action, float(probability), float(following), float(reward), float(ends))
             for state in range(len(table))
             for action in range(len(table[state]))
             for probability, following, reward, ends in table[state][action]
@@ -82,6 +82,7 @@ def _check_table(table: Any, name: str) -> None:
         ) from error
     columns = np.array(entries, dtype=np.float64).reshape(-1, 6).T
     check_finite(columns[2], columns[4], lambda k: entries[k][:2])
+    as_flags(columns[5])
     following = columns[3]
     bad = ~((following >= 0) & (following < len(table)) & (following % 1 == 0))
     if bad.any():

@@ -3,10 +3,14 @@
 from dataclasses import dataclass
 from typing import Any
 
-from trdlab.arrays import IntArray
+import numpy as np
+
+from trdlab.arrays import BoolArray, IntArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.tabular.table import as_states
+
+_SHOWN = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +22,7 @@ class LearnedTable:
         future: whose future it tells.
         visits: `[S, A]`, the windows learned from; where it is 0, the components are still those
             that learning began with.
-        left_out: the windows left out because their tail was not greedy.
+        left_out: the windows left out because their tail did not follow the policy.
         dropped: the windows lost to truncation.
     """
 
@@ -27,6 +31,25 @@ class LearnedTable:
     visits: IntArray
     left_out: int
     dropped: int
+
+    @property
+    def unlearned(self) -> BoolArray:
+        """`[S, A]`: what no window began with, so that nothing was learned of it.
+
+        That is all of a state in which every episode is over.
+        """
+        return self.visits == 0
+
+    def __str__(self) -> str:
+        axis, windows = self.time_axis, int(self.visits.sum())
+        told = f"The future of {self.future.policy}: {windows} windows of {axis.width} steps."
+        never = self.unlearned.all(axis=1)
+        if never.any():
+            told += f" No window began in {_listed('state', np.flatnonzero(never).tolist())}."
+        seldom = np.argwhere(self.unlearned & ~never[:, None]).tolist()
+        if seldom:
+            told += f" Nor with {_listed('state and action', [tuple(pair) for pair in seldom])}."
+        return told + " Nothing was learned of them." * bool(self.unlearned.any())
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -40,3 +63,10 @@ class LearnedTable:
             InputError: an observation is not the index of a state.
         """
         return self.decomposition[as_states(observations, len(self.decomposition))]
+
+
+def _listed(name: str, items: list[Any]) -> str:
+    """Returns the first few items, and how many there are."""
+    shown = ", ".join(map(str, items[:_SHOWN]))
+    more = f" and {len(items) - _SHOWN} more" if len(items) > _SHOWN else ""
+    return f"{name} {shown}{more}"

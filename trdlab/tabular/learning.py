@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from trdlab.arrays import FloatArray, IntArray
+from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, TrdlabError, closest
@@ -38,8 +38,8 @@ def learn(
 ) -> LearnedTable:
     """Learns a decomposition by temporal differences, with the law as target.
 
-    With a `policy` this is its evaluation: each window begins with an action drawn evenly (a
-    policy that avoids an action would otherwise never tell what it leads to), its other actions
+    With a `policy` this is its evaluation: some actions are drawn evenly (a policy that avoids an
+    action would otherwise never tell what it leads to), windows are used whose later actions
     follow the policy, and n is the expectation under it. Without one it is control: the actions
     are ε-greedy, and n belongs to the greedy action, as in Q-learning.
 
@@ -49,7 +49,8 @@ def learn(
 
     From a model, `num_envs` environments begin episodes of w steps in random states with random
     actions, so that everything is visited evenly. A Gymnasium environment begins where it begins,
-    and control takes a window from every step: what it seldom visits it learns badly.
+    and a window begins at every step; with a policy, one step in w is drawn evenly. What is seldom
+    visited is learned badly, what is never visited not at all (see `LearnedTable.unlearned`).
 
     An entry's n-th update has the step size (1 + (1 − γ^w)·n)^(−0.7), and the result is the
     average of the tables of all times, weighted 1, 2, 3, … The average also says which action is
@@ -94,7 +95,7 @@ def learn(
         if number < 1:
             raise InputError(f"The number of {name} is {number}.", "It must be at least 1.")
     rng, gamma, width = np.random.default_rng(seed), time_axis.gamma, time_axis.width
-    evenly_begun = isinstance(world, MDP) or policy is not None
+    is_model, exploring = isinstance(world, MDP), 1.0 / width  # of a policy's steps
     worlds = (
         ModelWorlds(world, num_envs, width, rng)
         if isinstance(world, MDP)
@@ -106,13 +107,18 @@ def learn(
     builder = WindowBuilder(width, gamma, worlds.num_envs, time_limit=worlds.time_limit)
     visits, updates = (np.zeros(table.shape[:2], dtype=np.int64) for _ in range(2))
     mean_table, left_out = table.copy(), 0
+    chance = 1.0  # that an action is one that windows may hold after their first
+    if given is not None:
+        chance = 1.0 if is_model else 1.0 - exploring
+    elif tail == "greedy":
+        chance = 1.0 - epsilon + epsilon / num_actions
 
     for turn in range(-(-agent_steps // worlds.num_envs)):  # rounded up
         here = worlds.observations  # [B]
         greedy = mean_table.sum(axis=2).argmax(axis=1)  # [S]
         evaluated = epsilon_greedy(greedy, num_actions, 0.0) if given is None else given  # [S, A]
         behaviour = epsilon_greedy(greedy, num_actions, epsilon) if given is None else given
-        first = evenly_begun & (builder.elapsed % width == 0)  # [B]
+        first = _explores(rng, builder, is_model, 0.0 if given is None else exploring)  # [B]
         evenly = rng.integers(num_actions, size=worlds.num_envs)
         actions = np.where(first, evenly, _drawn(behaviour[here], rng))
         step = worlds.step(actions)
@@ -123,12 +129,12 @@ def learn(
             step.terminated,
             step.truncated,
             step.next_observations,
-            greedy=actions == greedy[here],
-            begins=first | (not evenly_begun),
+            greedy=actions == greedy[here] if given is None else ~first,
+            begins=first | (not is_model),
             active=step.active,
         )
-        if given is None and tail == "greedy":
-            kept = _greedy_tails(windows, width, 1.0 - epsilon + epsilon / num_actions, rng)
+        if chance < 1.0:
+            kept = _tails_that_follow(windows, width, chance, rng)
             left_out += len(windows) - len(kept)
             windows = kept
 
@@ -153,6 +159,15 @@ def learn(
     )
 
 
+def _explores(
+    rng: "np.random.Generator", builder: WindowBuilder, is_model: bool, chance: float
+) -> BoolArray:
+    """Returns `[B]`: where the next action is drawn evenly, whatever the policy says."""
+    if is_model:  # at the beginning of each of its windows
+        return builder.elapsed % builder.width == 0
+    return rng.random(builder.num_envs) < chance
+
+
 def _drawn(probabilities: FloatArray, rng: "np.random.Generator") -> IntArray:
     """Returns `[B]`: an action for each row of `probabilities [B, A]`."""
     cumulative = probabilities.cumsum(axis=1)
@@ -160,13 +175,19 @@ def _drawn(probabilities: FloatArray, rng: "np.random.Generator") -> IntArray:
     return np.asarray((cumulative <= level[:, None]).sum(axis=1))
 
 
-def _greedy_tails(
+def _tails_that_follow(
     windows: Windows, width: int, chance: float, rng: "np.random.Generator"
 ) -> Windows:
-    """Returns the windows whose tails were greedy, all kinds of them equally often.
+    """Returns the windows whose later actions were those asked for, all kinds equally often.
 
-    A window that terminated early had fewer chances not to be greedy. To keep it whenever it was
+    A window that terminated early had fewer chances to go astray. To keep it whenever it did not
     would make an end look likelier than it is, so the actions that it was spared are drawn here.
+
+    Args:
+        windows: of which `tail_greedy` tells whether they followed.
+        width: w.
+        chance: that an action is one of those asked for.
+        rng: where chance comes from.
     """
     spared = chance ** (width - windows.steps)  # [K]
     return windows.where(windows.tail_greedy & (rng.random(len(windows)) < spared))
@@ -207,7 +228,7 @@ def _refuse_nothing_learned(used: int, left_out: int, builder: WindowBuilder) ->
         return
     if left_out:
         raise TrdlabError(
-            f"In none of {left_out} windows of {builder.width} steps was the tail greedy.",
+            f"None of {left_out} windows of {builder.width} steps followed the policy to its end.",
             "Choose a smaller epsilon or width, or take more steps.",
         )
     raise TrdlabError(

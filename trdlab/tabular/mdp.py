@@ -17,6 +17,10 @@ _Table = Sequence[_Item] | Mapping[int, _Item]  # by number: a list, or a dict a
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
+_UNIT = float(np.finfo(np.float64).eps)
+_UNDERFLOW = float(np.finfo(np.float64).smallest_subnormal)
+_SINGLE = float(np.finfo(np.float32).eps)
+_INEXACT = 1e-9  # how far a sum of probabilities may be from 1
 SMALL = 300
 """States up to which numpy alone is quicker than importing scipy."""
 
@@ -36,6 +40,8 @@ class MDP:
         terminated: `[K]`, whether the transition ends the episode.
         num_actions: A.
         start: the state in which episodes begin.
+        rounded_rows: the rows that were given in single precision; they are divided by their sum,
+            where that differs from 1 by no more than such numbers do.
 
     Raises:
         InputError: a row is empty or does not sum to 1, a probability is negative, a number is
@@ -49,6 +55,7 @@ class MDP:
     terminated: BoolArray
     num_actions: int
     start: int = 0
+    rounded_rows: int = 0
 
     def __post_init__(self) -> None:
         arrays = (self.next_states, self.probabilities, self.rewards, self.terminated)
@@ -74,8 +81,9 @@ class MDP:
             raise InputError(
                 f"{self._row_name(row)} has a negative probability.", "Check the model."
             )
+        self._divide_rounded_rows()
         sums = np.add.reduceat(self.probabilities, self.offsets[:-1])
-        if np.any(np.abs(sums - 1.0) > 1e-9):
+        if np.any(np.abs(sums - 1.0) > _INEXACT):
             row = int(np.argmax(np.abs(sums - 1.0)))
             raise InputError(
                 f"The probabilities of {self._row_name(row)} sum to {sums[row]:.12g}.",
@@ -85,10 +93,10 @@ class MDP:
             raise InputError(
                 "A transition leads to a state that does not exist.", "Check the model."
             )
-        if not 0 <= self.start < self.num_states:
+        if not isinstance(self.start, int | np.integer) or not 0 <= self.start < self.num_states:
             raise InputError(
-                f"The start state {self.start} does not exist.",
-                f"States run from 0 to {self.num_states - 1}.",
+                f"The start state {self.start!r} does not exist.",
+                f"States are numbers from 0 to {self.num_states - 1}.",
             )
 
     @classmethod
@@ -123,7 +131,7 @@ class MDP:
             next_states=np.array(next_states, dtype=np.int64),
             probabilities=np.array(probabilities, dtype=np.float64),
             rewards=np.array(rewards, dtype=np.float64),
-            terminated=np.array(terminated, dtype=np.bool_),
+            terminated=as_flags(terminated),
             num_actions=len(states[0]),
             start=start,
         )
@@ -166,8 +174,24 @@ class MDP:
 
     @cached_property
     def expected_rewards(self) -> FloatArray:
-        """`[S, A]`: E[R | s, a]."""
-        return self.per_action(self.probabilities * self.rewards)
+        """`[S, A]`: E[R | s, a]; 0 where its parts cancel to less than rounding can tell from 0."""
+        means, lost = self._summed_rewards
+        return np.where(np.abs(means) <= lost, 0.0, means)
+
+    @cached_property
+    def reward_bound(self) -> FloatArray:
+        """`[S, A]`: how far `expected_rewards` can be from the exact ones (proven)."""
+        means, lost = self._summed_rewards
+        return np.where(np.abs(means) <= lost, 2.0 * lost, lost)
+
+    @cached_property
+    def _summed_rewards(self) -> tuple[FloatArray, FloatArray]:
+        """The sums `[S, A]` of probability times reward, and what rounding can take from them."""
+        parts = self.probabilities * self.rewards
+        means = self.per_action(parts)
+        size = self.per_action(np.abs(parts)) if (parts < 0.0).any() else means
+        longest = int(np.diff(self.offsets).max())
+        return means, (longest + 1) * (_UNIT * size + _UNDERFLOW)
 
     @cached_property
     def leaves_state(self) -> BoolArray:
@@ -205,13 +229,29 @@ class MDP:
             raise InputError("A reward is not a finite number.", "Check the model.")
         other = copy(self)  # with what is derived from the dynamics, but not from the rewards
         object.__setattr__(other, "rewards", rewards)
-        other.__dict__.pop("expected_rewards", None)
+        for name in ("_summed_rewards", "expected_rewards", "reward_bound"):
+            other.__dict__.pop(name, None)
         return other
 
     def per_action(self, per_transition: FloatArray) -> FloatArray:
         """Returns `[S, A]`: the sums of `per_transition [K]` over the rows."""
         sums = np.add.reduceat(per_transition, self.offsets[:-1])
         return np.asarray(sums.reshape(self.num_states, self.num_actions))
+
+    def _divide_rounded_rows(self) -> None:
+        """Divides rows by their sum that single precision has kept from summing to 1."""
+        sums, lengths = (
+            np.add.reduceat(self.probabilities, self.offsets[:-1]),
+            np.diff(self.offsets),
+        )
+        off = np.abs(sums - 1.0)
+        rounded = (off > _INEXACT) & (off <= (lengths + 1) * _SINGLE)
+        single = self.probabilities == self.probabilities.astype(np.float32)
+        rounded &= np.logical_and.reduceat(single, self.offsets[:-1])
+        if rounded.any():
+            divided = self.probabilities / np.repeat(np.where(rounded, sums, 1.0), lengths)
+            object.__setattr__(self, "probabilities", divided)
+            object.__setattr__(self, "rounded_rows", self.rounded_rows + int(rounded.sum()))
 
     def _row_of(self, transition: int) -> int:
         return int(np.searchsorted(self.offsets, transition, side="right")) - 1
@@ -230,13 +270,30 @@ def take_rows(matrix: "csr_array", rows: IntArray) -> "csr_array":
     from scipy.sparse import csr_array
 
     length = int(matrix.indptr[1])
-    if not (np.diff(matrix.indptr) == length).all():
+    if not length or not (np.diff(matrix.indptr) == length).all():
         return matrix[rows]
     data, indices = (
         part.reshape(-1, length).take(rows, axis=0).ravel()
         for part in (matrix.data, matrix.indices)
     )
     return csr_array((data, indices, matrix.indptr[: len(rows) + 1]), (len(rows), matrix.shape[1]))
+
+
+def as_flags(values: Any) -> BoolArray:
+    """Returns true or false for each of `values`, checked.
+
+    Raises:
+        InputError: a value is neither, nor 0 or 1.
+    """
+    flags = np.asarray(values)
+    if flags.dtype == np.bool_:
+        return flags
+    wrong = flags[(flags != 0) & (flags != 1)]
+    if wrong.size:
+        raise InputError(
+            f"Whether a transition terminates is told by {wrong[0]}.", "Give True or False."
+        )
+    return flags.astype(np.bool_)
 
 
 def as_policy(probabilities: Any, shape: tuple[int, ...]) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from trdlab.arrays import FloatArray, IntArray
 from trdlab.errors import InputError
-from trdlab.tabular.mdp import MDP
+from trdlab.tabular.mdp import MDP, as_flags
 from trdlab.tabular.reach import reachable
 
 _LAYOUTS = (
@@ -37,7 +37,8 @@ def from_arrays(transitions: Any, rewards: Any, terminated: Any = None, *, start
 
     Raises:
         InputError: the shapes do not fit together, a row does not sum to 1 or is empty, a
-            probability is negative, or a number is not finite.
+            probability is negative, a number is not finite, `terminated` holds anything but
+            true and false, or there is no state `start`.
 
     >>> stay, go = [1.0, 0.0], [0.0, 1.0]
     >>> chain = from_arrays([[stay, go], [stay, go]], [[0.0, 1.0], [0.0, 2.0]])
@@ -161,8 +162,8 @@ def _rewards(
 def _ends(given: Any, shape: tuple[int, int], rows: IntArray, columns: IntArray) -> Any:
     ends = _layout(given, "terminated")
     if ends.shape == shape[:1]:
-        return ends[columns] != 0.0
-    return _at(ends, shape, rows, columns, "terminated", f"{shape[:1]} for states, ") != 0.0
+        return as_flags(ends)[columns]
+    return as_flags(_at(ends, shape, rows, columns, "terminated", f"{shape[:1]} for states, "))
 
 
 def _at(

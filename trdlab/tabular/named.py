@@ -128,6 +128,17 @@ class TabularWorld:
         lines[line][character] = AGENT
         return "\n".join(map("".join, lines))
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done to the model before it was solved, in sentences."""
+        rows = self.mdp.rounded_rows
+        if not rows:
+            return ()
+        return (
+            f"Probabilities come in single precision: {rows} "
+            f"{'row was' if rows == 1 else 'rows were'} divided by their sum.",
+        )
+
     @cached_property
     def visited(self) -> BoolArray:
         """`[S]`: the states in which an episode can be that is not over."""

@@ -47,7 +47,7 @@ class OperatorTable:
     def __str__(self) -> str:
         setting, value = f"w = {self.time_axis.width}, ε = {self.epsilon:g}", self.bias.value
         largest = np.abs(self.bias.components).max()
-        if largest <= _SAME * max(1.0, np.abs(self.optimal.components).max()):
+        if largest <= _SAME * np.abs(self.optimal.components).max():
             return f"{setting}: no bias."
         state, action = np.unravel_index(np.abs(value).argmax(), value.shape)
         learned = self.decomposition.value[state, action]
@@ -99,10 +99,9 @@ def operator_table(mdp: MDP, time_axis: TimeAxis, epsilon: float) -> OperatorTab
     actions = np.asarray(best.solution.policy.argmax(axis=1))
     for _ in range(_MAX_ROUNDS):
         behaviour = epsilon_greedy(actions, mdp.num_actions, epsilon)
-        q_values = _fixed_point(mdp, time_axis, actions, behaviour)
+        q_values, size = _fixed_point(mdp, time_axis, actions, behaviour)
         own = np.take_along_axis(q_values, actions[:, None], axis=1)[:, 0]
-        slack = _SAME * np.maximum(1.0, np.abs(own))
-        better = q_values.max(axis=1) > own + slack
+        better = q_values.max(axis=1) > own + _SAME * size
         if not better.any():
             table = _decomposed(mdp, time_axis, actions, behaviour, q_values)
             return OperatorTable(epsilon, table, best.decomposition, actions)
@@ -119,18 +118,26 @@ def check_epsilon(epsilon: float) -> None:
         raise InputError(f"ε is {epsilon}.", "It must be from 0 to 1.")
 
 
-def _fixed_point(mdp: MDP, axis: TimeAxis, actions: IntArray, behaviour: FloatArray) -> FloatArray:
-    """Returns `[S, A]`: the values, for fixed greedy actions and behaviour."""
+def _fixed_point(
+    mdp: MDP, axis: TimeAxis, actions: IntArray, behaviour: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Returns Q `[S, A]` for fixed greedy actions and behaviour, and the size `[S]` of its parts.
+
+    The size is what the greedy actions would be worth if every reward were positive: what is
+    smaller than a small part of it is rounding, in states far from any reward as well.
+    """
+    states, unsigned = np.arange(mdp.num_states), mdp.with_rewards(np.abs(mdp.rewards))
     rewards = _window_rewards(mdp, axis, behaviour)
-    values, states = np.zeros(mdp.num_states), np.arange(mdp.num_states)
-    q_values = rewards
+    sizes = _window_rewards(unsigned, axis, behaviour)[states, actions]
+    values, size = np.zeros(mdp.num_states), np.zeros(mdp.num_states)
     for _ in range(_MAX_SWEEPS):
         q_values = rewards + _window_later(mdp, axis, behaviour, values)
+        larger = sizes + _window_later(mdp, axis, behaviour, size)[states, actions]
         updated = q_values[states, actions]
-        change = np.abs(updated - values).max()
-        values = updated
-        if change <= _TOLERANCE * max(1.0, np.abs(values).max()) * (1.0 - axis.gamma):
-            return q_values
+        change = np.maximum(np.abs(updated - values), larger - size)
+        values, size = updated, larger
+        if (change <= _TOLERANCE * (1.0 - axis.gamma) * size).all():
+            return q_values, size
     raise TrdlabError("The values do not settle.", "Choose a smaller gamma.")
 
 

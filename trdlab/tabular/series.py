@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from trdlab.arrays import FloatArray, IntArray
+from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.tabular.mdp import MDP, SMALL, take_rows
+from trdlab.tabular.chains import UNIT, averaging, followed
+from trdlab.tabular.mdp import MDP, SMALL
 from trdlab.tabular.solve import Solution
 
 MAX_GIGABYTES = 8.0
@@ -64,6 +65,39 @@ def components(mdp: MDP, solution: Solution, axis: TimeAxis) -> Iterator[FloatAr
     yield next(series, nothing)
 
 
+def step_bounds(mdp: MDP, solution: Solution, count: int, width: int = 1) -> Iterator[FloatArray]:
+    """Yields how far what `steps` yields can be from the exact values (proven), `[S, A]` each.
+
+    Exact is the future of the solution's own policy. An error is carried on as the reward is, and
+    each step adds what rounding can take, as a share of the sizes that are added up; adding up
+    groups of `width` steps takes some more.
+    """
+    average, longest = averaging(solution.policy), int(np.diff(mdp.offsets).max())
+    rounding = UNIT * (8 + longest + mdp.num_actions)
+
+    def ahead(size: FloatArray, bound: FloatArray) -> tuple[FloatArray, FloatArray]:
+        later = average(size)
+        lost = average(bound) + rounding * later
+        return solution.gamma * mdp.expect(later), solution.gamma * mdp.expect(lost)
+
+    size, bound = np.abs(mdp.expected_rewards), mdp.reward_bound
+    for _ in range(count):
+        yield bound + (width - 1) * UNIT * size
+        size, bound = ahead(size, bound)
+    size, bound = np.abs(solution.q_values), solution.error_bound
+    for _ in range(count):
+        size, bound = ahead(size, bound)
+    yield bound
+
+
+def component_bounds(mdp: MDP, solution: Solution, axis: TimeAxis) -> FloatArray:
+    """Returns `[S, A, N+1]`: how far each component can be from the exact one (proven)."""
+    table = np.zeros((axis.num_components, *mdp.shape))
+    for step, bound in enumerate(step_bounds(mdp, solution, axis.num_steps, axis.width)):
+        table[step // axis.width] += bound  # the rest is that of step N·w
+    return np.moveaxis(table, 0, -1)
+
+
 def decompose(
     mdp: MDP, solution: Solution, axis: TimeAxis, dtype: type[np.floating] = np.float64
 ) -> FloatArray:
@@ -100,40 +134,12 @@ def table_gigabytes(mdp: MDP, axis: TimeAxis, dtype: type[np.floating] = np.floa
     return entries * np.dtype(dtype).itemsize / 1e9
 
 
-def averaging(policy: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Returns the map from x `[S, A]` to x^π `[S]`, Σ_a π(a|s) x(s, a)."""
-    return _averaging(policy, _rows(policy))
-
-
 def along(
     mdp: MDP, policy: FloatArray, gamma: float
 ) -> tuple[Callable[[FloatArray], FloatArray], Callable[[FloatArray], FloatArray]]:
     """Returns two maps: x `[S, A]` to x^π `[S]`, and v `[S]` to γ·C^π·v, one step ahead."""
-    rows = _rows(policy)
-    average = _averaging(policy, rows)
+    average = averaging(policy)
     if mdp.num_states <= SMALL:
         return average, lambda v: gamma * average(mdp.expect(v))
-    if rows is not None:
-        chain = take_rows(mdp.matrix, rows)
-        chain.data *= gamma
-    else:
-        from scipy.sparse import csr_array
-
-        weights = policy[mdp.transition_states, mdp.transition_actions] * mdp.continuation
-        pointers = mdp.offsets[:: mdp.num_actions]
-        shape = (mdp.num_states, mdp.num_states)
-        chain = csr_array((gamma * weights, mdp.next_states, pointers), shape)
+    chain = followed(mdp, policy, gamma)
     return average, lambda v: chain @ v
-
-
-def _averaging(policy: FloatArray, rows: IntArray | None) -> Callable[[FloatArray], FloatArray]:
-    if rows is None:
-        return lambda x: np.asarray((policy * x).sum(axis=1))
-    return lambda x: x.ravel().take(rows)
-
-
-def _rows(policy: FloatArray) -> IntArray | None:
-    """Returns `[S]`, s·A + a of the one action that is taken in each state, if it is one."""
-    rows = np.flatnonzero(policy)  # at least one in each state: its probabilities sum to 1
-    single = len(rows) == len(policy) and bool((policy.ravel().take(rows) == 1.0).all())
-    return rows if single else None

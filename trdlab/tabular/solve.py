@@ -1,26 +1,25 @@
 """Exact values: the optimal ones and those of a given policy, each with a proven error bound."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
-from trdlab.errors import InputError, TrdlabError
+from trdlab.errors import InputError, TrdlabError, closest
+from trdlab.tabular.chains import FINE, ROUGH, UNIT, Chain, averaging, chain_of, cover
 from trdlab.tabular.mdp import MDP, SMALL, as_policy
 
 Ties = Literal["lowest", "mixed"]
 
-_UNIT = float(np.finfo(np.float64).eps)
 _UNDERFLOW = float(np.finfo(np.float64).tiny)  # above what underflowing operations lose together
-_LARGEST_VALUE = 1e290  # leaves room for the bounds
-_MOST_DISCOUNT = 0.99  # up to here sweeps converge sooner than a sparse factorisation is done
-_MOST_FACTORISED = 50_000  # states; beyond, a factorisation does not fit into memory
-_TOLERANCE = 1e-12  # of the largest reward's perpetual value, for models solved by sweeps
-_QUICK_GAIN = 1e-13  # relative
+_LARGEST_VALUE = 1e140  # leaves room for variances and bounds
+_GAIN = 1e-12  # relative, below which an action is not changed unless it is proven better
+_SWEEPS, _MOST_SWEEPS = 8, 16_384  # of value iteration between two evaluations
 _MAX_SWEEPS = 2_000
 _MAX_IMPROVEMENTS = 10_000
+_MAX_ROUNDS, _MAX_COVERS = 60, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +31,12 @@ class Solution:
         policy: `[S, A]`, the action probabilities whose future it is.
         q_values: `[S, A]`.
         error_bound: `[S, A]`, proven: no Q-value is further than this from the exact one of its
-            policy, and for an optimal policy from the exact optimal one.
+            policy, and for an optimal policy from the exact optimal one. A bound is as small as
+            its value is: values of far rewards are as certain as those of near ones. What cannot
+            be told from 0 is 0.
         tied: `[S, A]`, the optimal actions of each state where several cannot be told apart
-            within twice the bound of their evaluation. All false where the best action is
-            unique, in terminal states, and for a given policy.
+            within their bounds. All false where the best action is unique, in terminal states,
+            and for a given policy.
         is_optimal: whether the policy was solved for, not given.
     """
 
@@ -52,10 +53,8 @@ class Solution:
         return np.asarray((self.policy * self.q_values).sum(axis=1))
 
 
-def optimal(
-    mdp: MDP, gamma: float, *, ties: Ties = "lowest", tolerance: float | None = None
-) -> Solution:
-    """Solves for the optimal values: policy iteration to the end, or by blocks in large models.
+def optimal(mdp: MDP, gamma: float, *, ties: Ties = "lowest") -> Solution:
+    """Solves for the optimal values: policy iteration, until no action can be proven better.
 
     Where optimal actions tie, Q is unique but the future is not. `ties` says whose it is:
     `lowest` takes the tied action with the lowest index, `mixed` all of them evenly.
@@ -64,28 +63,24 @@ def optimal(
         mdp: the model.
         gamma: the discount factor, in [0, 1).
         ties: how to choose among tied optimal actions.
-        tolerance: the error that is allowed in large models; by default 10⁻¹² of what the
-            largest reward would be worth if it were paid for ever. Small ones are solved to
-            rounding.
 
     Raises:
-        InputError: γ is outside [0, 1), or the values are out of reach of double precision.
+        InputError: γ is outside [0, 1), `ties` is neither, or the values are out of reach of
+            double precision.
     """
     _check(mdp, gamma)
-    if _is_large(mdp, gamma):
-        # what ties are allowed to lose at each step adds up to 1 / (1 − γ) times as much
-        asked = None if tolerance is None else 0.1 * tolerance * (1.0 - gamma)
-        return _optimal_by_sweeps(mdp, gamma, ties, asked or _default_tolerance(mdp, gamma))
-    actions, _ = improved(mdp, gamma, _greedy_after_sweeps(mdp, gamma))
-    best = _surely_improved(mdp, gamma, actions)
-    most, least = best.q_values + best.error_bound, best.q_values - best.error_bound
-    near = most >= least.max(axis=1, keepdims=True)
-    policy = near / near.sum(axis=1, keepdims=True) if ties == "mixed" else _lowest(near)
-    chosen = _chosen_without_loss(mdp, best, policy)
+    if ties not in get_args(Ties):
+        raise InputError(f"The ties are {ties!r}.", closest(str(ties), get_args(Ties)))
+    best = _surely_improved(mdp, gamma, *_nearly_optimal(mdp, gamma))
+    bound = best.solution.error_bound + gamma * mdp.expect(_excess(mdp, gamma, best) - best.error)
+    q_values = best.solution.q_values
+    near = q_values + bound >= (q_values - bound).max(axis=1, keepdims=True)
     several = (near.sum(axis=1) > 1) & ~mdp.terminal_states
+    policy = near / near.sum(axis=1, keepdims=True) if ties == "mixed" else _lowest(near)
+    chosen = _chosen_without_loss(mdp, gamma, best, policy).solution
     return replace(
         chosen,
-        error_bound=_optimality_bound(chosen),
+        error_bound=np.maximum(chosen.error_bound, np.abs(chosen.q_values - q_values) + bound),
         tied=near & several[:, None],
         is_optimal=True,
     )
@@ -99,59 +94,36 @@ def evaluate(mdp: MDP, policy: FloatArray, gamma: float) -> Solution:
             out of reach of double precision.
     """
     _check(mdp, gamma)
-    policy = as_policy(policy, mdp.shape)
-    if _is_large(mdp, gamma):
-        start = np.zeros(mdp.num_states)
-        return _evaluated_by_sweeps(mdp, gamma, policy, _default_tolerance(mdp, gamma), start)
-    return _evaluated(mdp, gamma, policy)
+    return _evaluated(mdp, gamma, as_policy(policy, mdp.shape)).solution
 
 
-def _is_large(mdp: MDP, gamma: float) -> bool:
+def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, FloatArray]:
+    """Policy iteration from given actions, as far as gains stand out from rounding.
+
+    It is the quick way to follow an optimum while the model changes a little; it proves nothing.
+
+    Args:
+        mdp: the model.
+        gamma: the discount factor, in [0, 1).
+        actions: `[S]`, a deterministic policy to start from.
+
+    Returns:
+        Optimal actions `[S]` and their Q-values `[S, A]`.
+    """
+    actions, values = _improved(mdp, gamma, actions, None)
+    return actions, mdp.expected_rewards + gamma * mdp.expect(values)
+
+
+# ---- policy iteration ----------------------------------------------------------------------------
+
+
+def _nearly_optimal(mdp: MDP, gamma: float) -> tuple[IntArray, FloatArray]:
+    """Returns actions `[S]` that are nearly always optimal, and their values `[S]`."""
     if mdp.num_states <= SMALL:
-        return False
-    return gamma <= _MOST_DISCOUNT or mdp.num_states > _MOST_FACTORISED
+        return _improved(mdp, gamma, _greedy_after_sweeps(mdp, gamma), None)
+    from trdlab.tabular.sweeps import first_actions
 
-
-def _default_tolerance(mdp: MDP, gamma: float) -> float:
-    from trdlab.tabular import sweeps
-
-    perpetual = max(float(np.abs(mdp.expected_rewards).max()), 1e-300) / (1.0 - gamma)
-    return max(_TOLERANCE, 2.0 * sweeps.least_tolerance(mdp, gamma)) * perpetual
-
-
-def _optimal_by_sweeps(mdp: MDP, gamma: float, ties: Ties, tolerance: float) -> Solution:
-    """Solves a large model: the bound is that of the values, carried over to Q."""
-    from trdlab.tabular import sweeps
-
-    values, error = sweeps.optimal_values(mdp, gamma, tolerance)
-    q_values = mdp.expected_rewards + gamma * mdp.expect(values)
-    slack = gamma * error + 4 * _UNIT * np.abs(q_values)
-    near = q_values + slack >= (q_values - slack).max(axis=1, keepdims=True)
-    policy = near / near.sum(axis=1, keepdims=True) if ties == "mixed" else _lowest(near)
-    chosen = _evaluated_by_sweeps(mdp, gamma, policy, tolerance, values)
-    several = (near.sum(axis=1) > 1) & ~mdp.terminal_states
-    return replace(
-        chosen,
-        error_bound=_optimality_bound(chosen),
-        tied=near & several[:, None],
-        is_optimal=True,
-    )
-
-
-def _evaluated_by_sweeps(
-    mdp: MDP, gamma: float, policy: FloatArray, tolerance: float, start: FloatArray
-) -> Solution:
-    from trdlab.tabular import sweeps
-
-    values, error = sweeps.policy_values(mdp, policy, gamma, tolerance, start)
-    q_values = mdp.expected_rewards + gamma * mdp.expect(values)
-    return Solution(
-        gamma=gamma,
-        policy=policy,
-        q_values=q_values,
-        error_bound=gamma * error + 4 * _UNIT * np.abs(q_values),
-        tied=np.zeros(q_values.shape, dtype=np.bool_),
-    )
+    return _improved(mdp, gamma, *first_actions(mdp, gamma))
 
 
 def _greedy_after_sweeps(mdp: MDP, gamma: float) -> IntArray:
@@ -171,124 +143,183 @@ def _greedy_after_sweeps(mdp: MDP, gamma: float) -> IntArray:
     return actions
 
 
-def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, FloatArray]:
-    """Policy iteration from given actions, as far as gains stand out from rounding.
+def _improved(
+    mdp: MDP, gamma: float, actions: IntArray, values: FloatArray | None
+) -> tuple[IntArray, FloatArray]:
+    """Policy iteration with sweeps of value iteration between the evaluations.
 
-    It is the quick way to follow an optimum while the model changes a little; it proves nothing.
-
-    Args:
-        mdp: the model.
-        gamma: the discount factor, in [0, 1).
-        actions: `[S]`, a deterministic policy to start from.
-
-    Returns:
-        Optimal actions `[S]` and their Q-values `[S, A]`.
+    A change of action spreads by one step in each improvement. So there are several sweeps for
+    each evaluation, and twice as many each time that little was won. Evaluations become more
+    exact from round to round; then the gain that counts grows, so that noise cannot go on for ever.
     """
-    states = np.arange(mdp.num_states)
-    for _ in range(_MAX_IMPROVEMENTS):
-        taken = actions[mdp.transition_states] == mdp.transition_actions
-        rewards = mdp.expected_rewards[states, actions]
-        values = solve_chain(mdp, gamma * mdp.continuation * taken, rewards)
-        q_values = mdp.expected_rewards + gamma * mdp.expect(values)
-        own = q_values[states, actions]
-        best = q_values.argmax(axis=1)
-        better = q_values[states, best] > own + _QUICK_GAIN * np.abs(own)
-        if not better.any():
+    states, sweeps, left = np.arange(mdp.num_states), _SWEEPS, mdp.num_states
+    tolerance, margin = (FINE if mdp.num_states <= SMALL else ROUGH), _GAIN
+    for _ in range(_MAX_ROUNDS):
+        chain, rewards = _deterministic(mdp, gamma, actions), mdp.expected_rewards[states, actions]
+        while True:
+            values = chain.solve(rewards, values, tolerance)
+            first = _better(mdp, gamma, values, actions, max(tolerance, margin))
+            if tolerance == FINE or not np.array_equal(first, actions):
+                break
+            tolerance = FINE
+        if np.array_equal(first, actions):
             break
-        actions = np.where(better, best, actions)
-    return actions, q_values
+        ahead = values
+        for _ in range(sweeps):
+            ahead = (mdp.expected_rewards + gamma * mdp.expect(ahead)).max(axis=1)
+        then = _better(mdp, gamma, ahead, actions, max(tolerance, margin))
+        changed = int((then != actions).sum())
+        actions, values = (then, ahead) if changed else (first, values)
+        sweeps = min(2 * sweeps, _MOST_SWEEPS) if 2 * changed > left else sweeps
+        left, margin = changed, 1.5 * margin if tolerance == FINE else margin
+        tolerance = max(0.1 * tolerance, FINE)
+    return actions, values
 
 
-def _surely_improved(mdp: MDP, gamma: float, actions: IntArray) -> Solution:
+def _better(
+    mdp: MDP, gamma: float, values: FloatArray, actions: IntArray, margin: float
+) -> IntArray:
+    """Returns the best actions `[S]` where they win by a relative margin, else those given."""
+    q_values = mdp.expected_rewards + gamma * mdp.expect(values)
+    states, best = np.arange(mdp.num_states), q_values.argmax(axis=1)
+    size = _sizes(mdp, gamma, values)
+    gain = q_values[states, best] - q_values[states, actions]
+    return np.where(
+        gain > margin * np.maximum(size[states, best], size[states, actions]), best, actions
+    )
+
+
+def _surely_improved(
+    mdp: MDP, gamma: float, actions: IntArray, values: FloatArray
+) -> "_Evaluation":
     """Policy iteration that changes an action only where it is proven better, so it must end."""
     for _ in range(_MAX_IMPROVEMENTS):
-        policy = np.zeros((mdp.num_states, mdp.num_actions))
-        policy[np.arange(mdp.num_states), actions] = 1.0
-        solution = _evaluated(mdp, gamma, policy)
-        gain = _gains(solution, pessimistic=True)
+        found = _evaluated(mdp, gamma, _one_hot(actions, mdp.num_actions), values)
+        gain = _sure_gains(found.solution)
         better = gain.max(axis=1) > 0.0
         if not better.any():
-            return solution
-        actions = np.where(better, gain.argmax(axis=1), actions)
+            return found
+        actions, values = np.where(better, gain.argmax(axis=1), actions), found.values
     raise TrdlabError(
         f"Policy iteration did not end in {_MAX_IMPROVEMENTS} rounds.", "Report this model."
     )
 
 
-def _chosen_without_loss(mdp: MDP, best: Solution, policy: FloatArray) -> Solution:
+def _sure_gains(solution: Solution) -> FloatArray:
+    """Returns `[S, A]`: the least that an action is better than the policy's."""
+    average = averaging(solution.policy)
+    own = average(solution.q_values + solution.error_bound)
+    return np.asarray(solution.q_values - solution.error_bound - own[:, None])
+
+
+def _chosen_without_loss(
+    mdp: MDP, gamma: float, best: "_Evaluation", policy: FloatArray
+) -> "_Evaluation":
     """Evaluates the choice among tied actions, undone in states where it proves to lose.
 
     Close to γ = 1 an action can be too little worse than the best to be told apart, and yet cost
     much when it is taken again and again.
     """
-    best_values = best.state_values
-    best_bound = (best.policy * best.error_bound).sum(axis=1)
-    while not np.array_equal(policy, best.policy):
-        chosen = _evaluated(mdp, best.gamma, policy)
-        bound = best_bound + (policy * chosen.error_bound).sum(axis=1)
-        loses = (chosen.state_values + bound < best_values) & (policy != best.policy).any(axis=1)
+    while not np.array_equal(policy, best.solution.policy):
+        chosen = _evaluated(mdp, gamma, policy, best.values)
+        other = (policy != best.solution.policy).any(axis=1)
+        loses = other & (chosen.values + chosen.error < best.values - best.error)
         if not loses.any():
             return chosen
-        policy = np.where(loses[:, None], best.policy, policy)
+        policy = np.where(loses[:, None], best.solution.policy, policy)
     return best
 
 
-def _gains(solution: Solution, *, pessimistic: bool) -> FloatArray:
-    """Returns `[S, A]`: the least (or most) that an action can be better than the policy's."""
-    own = (solution.policy * solution.q_values).sum(axis=1, keepdims=True)
-    slack = solution.error_bound + (solution.policy * solution.error_bound).sum(1, keepdims=True)
-    return np.asarray(solution.q_values - own + (-slack if pessimistic else slack))
+# ---- values with a proven bound ------------------------------------------------------------------
 
 
-def _optimality_bound(solution: Solution) -> FloatArray:
-    """Returns `[S, A]`: how far the Q-values of a policy can be from the optimal ones.
+@dataclass(frozen=True, eq=False)
+class _Evaluation:
+    """A solution, and what it was made of: values `[S]`, their residual and their bound `[S]`."""
 
-    If no other action can be better, the policy is optimal and only its evaluation errs. What
-    cannot be excluded, a gain of η a step, adds up to η / (1 − γ) at the most.
-    """
-    others = np.where(solution.policy == 1.0, 0.0, _gains(solution, pessimistic=False))
-    unexcluded = max(float(others.max()), 0.0)
-    return solution.error_bound + 1.01 * unexcluded / (1.0 - solution.gamma)
+    solution: Solution
+    values: FloatArray
+    residual: FloatArray
+    error: FloatArray
 
 
-def _evaluated(mdp: MDP, gamma: float, policy: FloatArray) -> Solution:
+def _evaluated(
+    mdp: MDP, gamma: float, policy: FloatArray, start: FloatArray | None = None
+) -> _Evaluation:
     """Evaluates a policy; the bound is a forward error analysis, state by state.
 
-    The computed v misses its own equation v = r + γCv by a residual that is known up to
-    rounding; its error is that residual carried along the chain, (I − γC)⁻¹·|residual|. That in
-    turn is computed, enlarged, and checked: y ≥ (I − γC)⁻¹·x holds wherever y − γCy ≥ x does,
-    and where x is missed by σ, adding 1.01·σ / (1 − γ) makes up for it.
+    The computed v misses its own equation v = r + Mv by a residual that is known up to rounding;
+    its error is that residual carried along the chain, (I − M)⁻¹·|residual|, or less.
     """
-    weights = transition_weights(mdp, policy)
-    chain = gamma * weights * ~mdp.terminated
-    rewards = mdp.per_state(weights * mdp.rewards)
-    values = solve_chain(mdp, chain, rewards)
-    next_values = values[mdp.next_states]
-    rounding = _UNIT * (8 + int(np.diff(mdp.offsets).max()) * mdp.num_actions)
-    size = mdp.per_state(np.abs(weights * mdp.rewards) + chain * np.abs(next_values)) + np.abs(
-        values
-    )
-    residual = np.abs(rewards + mdp.per_state(chain * next_values) - values)
-    residual += rounding * size + _UNDERFLOW
-    carried = 1.01 * np.abs(solve_chain(mdp, chain, residual))
-    proven = carried - mdp.per_state(chain * carried[mdp.next_states]) - 2 * rounding * carried
-    carried += 1.01 * max(float((residual - proven).max()), 0.0) / (1.0 - gamma)
-    size_of_q = mdp.per_action(np.abs(mdp.probabilities * mdp.rewards)) + gamma * mdp.expect(
-        np.abs(values)
-    )
-    return Solution(
+    chain, average = chain_of(mdp, policy, gamma), averaging(policy)
+    rewards = average(mdp.expected_rewards)
+    values = chain.solve(rewards, start)
+    rounding = UNIT * (8 + mdp.num_actions + chain.terms)
+    size = average(np.abs(mdp.expected_rewards)) + chain.ahead(np.abs(values)) + np.abs(values)
+    residual = np.abs(rewards + chain.ahead(values) - values) + rounding * size
+    residual += average(mdp.reward_bound) + _UNDERFLOW
+    error = cover(chain, residual, gamma)
+    q_values = mdp.expected_rewards + gamma * mdp.expect(values)
+    bound = gamma * mdp.expect(error) * (1.0 + rounding) + _lost(mdp, gamma, values)
+    zero = np.abs(q_values) <= bound
+    solution = Solution(
         gamma=gamma,
         policy=policy,
-        q_values=mdp.expected_rewards + gamma * mdp.expect(values),
-        error_bound=gamma * mdp.expect(carried) + rounding * size_of_q + _UNDERFLOW,
-        tied=np.zeros((mdp.num_states, mdp.num_actions), dtype=np.bool_),
+        q_values=np.where(zero, 0.0, q_values),
+        error_bound=np.where(zero, 2.0 * bound, bound),
+        tied=np.zeros(mdp.shape, dtype=np.bool_),
     )
+    return _Evaluation(solution, values, residual, error)
+
+
+def _lost(mdp: MDP, gamma: float, values: FloatArray) -> FloatArray:
+    """Returns `[S, A]`: what rounding can do to E[R] + γ·C·values."""
+    rounding = UNIT * (8 + int(np.diff(mdp.offsets).max()))
+    return mdp.reward_bound + rounding * _sizes(mdp, gamma, values) + _UNDERFLOW
+
+
+def _sizes(mdp: MDP, gamma: float, values: FloatArray) -> FloatArray:
+    """Returns `[S, A]`: the sum of the sizes of what makes up a Q-value."""
+    return np.abs(mdp.expected_rewards) + gamma * mdp.expect(np.abs(values))
+
+
+def _excess(mdp: MDP, gamma: float, best: _Evaluation) -> FloatArray:
+    """Returns z `[S]`, proven: no policy's value is greater than that of the best one by more.
+
+    v + z is at least the optimum wherever it is not increased by the Bellman operator, that is
+    where z(s) ≥ gain(s, a) + γ·C·z for all actions. The error of the evaluation is nearly always
+    enough; where a tied action asks for more, it is followed.
+    """
+    values, states = best.values, np.arange(mdp.num_states)
+    gains = mdp.expected_rewards + gamma * mdp.expect(values) - values[:, None]
+    gains += _lost(mdp, gamma, values) + UNIT * np.abs(values)[:, None]
+    actions, z = best.solution.policy.argmax(axis=1), best.error
+    for turn in range(_MAX_COVERS + 1):
+        needed = gains + (1.0 + 64 * UNIT) * gamma * mdp.expect(z)
+        short = needed.max(axis=1) - z
+        if not (short > 0.0).any():
+            return z
+        if turn < _MAX_COVERS:
+            actions = np.where(short > 0.0, needed.argmax(axis=1), actions)
+            right = np.maximum(1.5 * gains[states, actions], best.residual)
+            z = np.maximum(z, cover(_deterministic(mdp, gamma, actions), right, gamma))
+    return z + 1.01 * float(short.max()) / (1.0 - gamma)
+
+
+def _deterministic(mdp: MDP, gamma: float, actions: IntArray) -> Chain:
+    return chain_of(mdp, _one_hot(actions, mdp.num_actions), gamma)
+
+
+def _one_hot(actions: IntArray, num_actions: int) -> FloatArray:
+    policy = np.zeros((len(actions), num_actions))
+    policy[np.arange(len(actions)), actions] = 1.0
+    return policy
 
 
 def _check(mdp: MDP, gamma: float) -> None:
     TimeAxis(gamma, 0)
     inexact = float(mdp.per_action(mdp.probabilities).max()) - 1.0
-    inexact += _UNIT if np.any(mdp.probabilities % 1.0) else 0.0
+    inexact += UNIT if np.any(mdp.probabilities % 1.0) else 0.0
     if inexact > 0.005 * (1.0 - gamma):
         raise InputError(
             f"gamma = {gamma!r} is too close to 1 for a model whose probabilities sum to 1 only "
@@ -298,43 +329,12 @@ def _check(mdp: MDP, gamma: float) -> None:
     largest = float(np.abs(mdp.rewards).max())
     if largest > _LARGEST_VALUE * (1.0 - gamma):
         raise InputError(
-            f"Rewards of {largest:.3g} at gamma = {gamma!r} can add up beyond double precision.",
+            f"Rewards of {largest:.3g} at gamma = {gamma!r} can add up to {_LARGEST_VALUE:.0e} or "
+            "more, whose square is beyond double precision.",
             "Give smaller rewards.",
         )
 
 
-def transition_weights(mdp: MDP, policy: FloatArray) -> FloatArray:
-    """Returns `[K]`: π(a|s)·P(s′|s, a)."""
-    return np.asarray(policy[mdp.transition_states, mdp.transition_actions] * mdp.probabilities)
-
-
-def solve_chain(
-    mdp: MDP, chain: FloatArray, right: FloatArray, among: BoolArray | None = None
-) -> FloatArray:
-    """Solves x = right + chain·x, for all states or for those in `among` with 0 outside."""
-    size, keep = mdp.num_states, chain != 0.0
-    sources, targets, weights = mdp.transition_states[keep], mdp.next_states[keep], chain[keep]
-    among = np.ones(size, dtype=np.bool_) if among is None else among
-    try:
-        if size <= SMALL:
-            matrix = np.bincount(sources * size + targets, weights, size * size)
-            system = np.eye(size) - matrix.reshape(size, size)
-            return np.linalg.solve(system[np.ix_(among, among)], right[among])
-        from scipy.sparse import csc_array, eye_array
-        from scipy.sparse.linalg import splu
-
-        entries = csc_array((weights, (sources, targets)), (size, size))
-        sparse = (eye_array(size, format="csc") - entries)[among][:, among]
-        return np.asarray(splu(sparse.tocsc()).solve(right[among]))
-    except (np.linalg.LinAlgError, RuntimeError) as error:  # the system is singular
-        raise InputError(
-            "The values are out of reach of double precision: the future is all but endless.",
-            "Choose a smaller gamma.",
-        ) from error
-
-
 def _lowest(mask: BoolArray) -> FloatArray:
     """Returns `[S, A]`: all probability on the first true entry of each row."""
-    policy = np.zeros(mask.shape)
-    policy[np.arange(len(mask)), mask.argmax(axis=1)] = 1.0
-    return policy
+    return _one_hot(mask.argmax(axis=1), mask.shape[1])

@@ -1,11 +1,12 @@
-"""Values of large models: modified policy iteration over blocks of neighbouring states.
+"""Nearly optimal actions of large models: modified policy iteration over blocks of states.
 
 Three things make it quick. States are ordered by their distance from reward, so that a block is
 fed by the blocks before it, and fits into the cache; and their first values are those of heading
 there. A block rests while nothing that it reads changes, so that work is done only where values
 still move. And evaluating the chosen actions takes a product of S rows, repeated until it pays to
-look at all S·A rows again; once no action changes any more, until the end. See Puterman and Shin
-(1978) for modified policy iteration, and Wingate and Seppi (2005) for prioritised blocks.
+look at all S·A rows again. Changes are relative, so that far rewards decide as near ones do. See
+Puterman and Shin (1978) for modified policy iteration, and Wingate and Seppi (2005) for
+prioritised blocks.
 """
 
 from functools import reduce
@@ -14,20 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trdlab.arrays import FloatArray, IntArray
-from trdlab.errors import InputError, TrdlabError
 from trdlab.tabular.mdp import MDP, take_rows
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-BLOCK = 16_384
+BLOCK = 2_048
+_NEARLY = 1e-3  # relative change of a sweep, at which values are good enough to choose by
 _BURST, _EVALUATE_TO = 3, 0.1
 # sweeps over a block between two looks at how much it changes, and the part of the last
-# improvement's change to leave, if there are several blocks
-_ALONE_BURST, _ALONE_EVALUATE_TO = 8, 1.0  # if there is only one: calls take most of the time
+# improvement's change to leave
 _MAX_BURSTS = 16  # before all actions are compared again
-_MAX_ROUNDS = 100_000
-_UNIT = float(np.finfo(np.float64).eps)
+_MAX_ROUNDS, _MAX_TURNS = 3, 4  # over all blocks, and in one: it is only a beginning
+_LEAST = 1e-300
 
 
 class _Block:
@@ -48,20 +48,33 @@ class _Block:
         self._rows = np.full(size, -1)  # [b], of the chosen actions: none yet
         self._chain, self._gains = matrix, rewards  # [b, S] and [b]: those rows, their rewards
 
-    def improve(self, values: FloatArray) -> tuple[float, bool]:
-        """Applies the Bellman operator in place, and chooses the best actions.
+    @property
+    def actions(self) -> IntArray:
+        """`[b]`: the chosen ones."""
+        return self._rows - self._first_rows
 
-        Returns:
-            The largest change, and whether an action changed.
-        """
+    def settle(self, values: FloatArray) -> float:
+        """Improves and evaluates until little changes; returns the largest change of a sweep."""
+        change = most = self.improve(values)
+        for _ in range(_MAX_TURNS):
+            if change <= _NEARLY:
+                break
+            aim = max(_EVALUATE_TO * change, _NEARLY)
+            for _ in range(_MAX_BURSTS):
+                if self.evaluate(values, _BURST) <= aim:
+                    break
+            change = self.improve(values)
+        return most
+
+    def improve(self, values: FloatArray) -> float:
+        """Applies the Bellman operator, chooses the best actions; returns the largest change."""
         q_values = self.matrix @ values
         q_values += self.rewards
         rows = q_values.reshape(len(self._rows), -1).argmax(axis=1)  # the first of equals
         rows += self._first_rows
-        other = not np.array_equal(rows, self._rows)
-        if other:
+        if not np.array_equal(rows, self._rows):
             self._choose(rows)
-        return self._replace(values, q_values[rows]), other
+        return self._replace(values, q_values[rows])
 
     def evaluate(self, values: FloatArray, sweeps: int) -> float:
         """Applies the chosen actions' operator some times; returns the last largest change."""
@@ -83,148 +96,33 @@ class _Block:
 
     def _replace(self, values: FloatArray, new: FloatArray) -> float:
         own = values[self.span]
-        change = float(np.abs(new - own).max())
+        size = np.maximum(np.maximum(np.abs(new), np.abs(own)), _LEAST)
+        change = float((np.abs(new - own) / size).max())
         own[:] = new
         return change
 
 
-def optimal_values(mdp: MDP, gamma: float, tolerance: float) -> tuple[FloatArray, float]:
-    """Returns the optimal values `[S]` and how far they can be from the exact ones (proven).
-
-    With T the Bellman operator, ‖T v − v*‖ ≤ γ/(1 − γ)·‖T v − v‖.
+def first_actions(mdp: MDP, gamma: float) -> tuple[IntArray, FloatArray]:
+    """Returns nearly optimal actions `[S]` of a large model, and about what they are worth `[S]`.
 
     Args:
         mdp: the model.
         gamma: the discount factor, in [0, 1).
-        tolerance: the error that is allowed.
-
-    Raises:
-        InputError: the tolerance is finer than rounding allows.
     """
     order, ahead, chance = _toward_reward(mdp)
-    return _solved(mdp, gamma, tolerance, order, _guess(mdp, gamma, ahead, chance))
-
-
-def policy_values(
-    mdp: MDP, policy: FloatArray, gamma: float, tolerance: float, start: FloatArray
-) -> tuple[FloatArray, float]:
-    """Returns the values `[S]` of a policy `[S, A]`, and how far they can be off (proven).
-
-    Args:
-        mdp: the model.
-        policy: the probability of each action.
-        gamma: the discount factor, in [0, 1).
-        tolerance: the error that is allowed.
-        start: `[S]`, values to start from.
-
-    Raises:
-        InputError: the tolerance is finer than rounding allows.
-    """
-    order, _, _ = _toward_reward(mdp)
-    weights = policy[mdp.transition_states, mdp.transition_actions] * mdp.probabilities
-    followed = MDP(
-        offsets=mdp.offsets[:: mdp.num_actions],
-        next_states=mdp.next_states,
-        probabilities=weights,
-        rewards=mdp.rewards,
-        terminated=mdp.terminated,
-        num_actions=1,
-        start=mdp.start,
-    )
-    return _solved(followed, gamma, tolerance, order, start)
-
-
-def least_tolerance(mdp: MDP, gamma: float) -> float:
-    """Returns the finest error that rounding allows, as a share of the largest value."""
-    return 2.0 * _UNIT * (4 + int(np.diff(mdp.offsets).max())) / (1.0 - gamma)
-
-
-def _solved(
-    mdp: MDP, gamma: float, tolerance: float, order: IntArray, start: FloatArray
-) -> tuple[FloatArray, float]:
-    """Improves and evaluates until the bound is proven; `order` and `start` say how to begin.
-
-    A pass over all blocks that changes nothing by more than δ proves γ·δ/(1 − γ): block by block
-    it applied T to values at most δ from those that it left, so T changes these by γ·δ at most.
-    """
+    start = _guess(mdp, gamma, ahead, chance)
     order = order if mdp.num_states > BLOCK else np.arange(mdp.num_states)
     blocks, readers = _blocks(mdp, gamma, order)
     values, dirty = start[order], set(range(len(blocks)))
-    rounding, paid = least_tolerance(mdp, gamma), float(np.abs(mdp.expected_rewards).max())
-    part = _ALONE_EVALUATE_TO if len(blocks) == 1 else _EVALUATE_TO
     for _ in range(_MAX_ROUNDS):
-        changes, settled = _improve(blocks, values, dirty)
-        unsure = rounding * (paid + float(np.abs(values).max()))
-        allowed = max(tolerance - 2.0 * unsure, unsure) * (1.0 - gamma)
-        moved = {b for b, change in changes.items() if change > allowed}
-        if moved:
-            target = allowed if settled else max(part * max(changes.values()), allowed)
-            moved |= _evaluate(blocks, readers, values, moved, target, allowed)
-            dirty = set().union(*(readers[b] for b in moved))
-        elif len(dirty) < len(blocks):
-            dirty = set(range(len(blocks)))
-        else:
-            bound = gamma * max(changes.values()) / (1.0 - gamma) + unsure
-            return _placed(values, order), _checked(bound, tolerance)
-    raise TrdlabError(
-        f"The values did not settle in {_MAX_ROUNDS} rounds.", "Choose a smaller gamma."
-    )
-
-
-def _placed(values: FloatArray, order: IntArray) -> FloatArray:
-    """Puts the values of an order into that of the model."""
-    placed = np.empty_like(values)
-    placed[order] = values
-    return placed
-
-
-def _checked(bound: float, tolerance: float) -> float:
-    if bound > tolerance:
-        raise InputError(
-            f"An error of {tolerance:.0e} is finer than rounding allows: {bound:.0e} was reached.",
-            "Allow a larger error, or choose a smaller gamma.",
-        )
-    return bound
-
-
-def _improve(
-    blocks: list[_Block], values: FloatArray, todo: set[int]
-) -> tuple[dict[int, float], bool]:
-    """Improves blocks, in place; returns their largest changes, and whether all actions stayed."""
-    changes, settled = {}, True
-    for b in sorted(todo):
-        changes[b], other = blocks[b].improve(values)
-        settled = settled and not other
-    return changes, settled
-
-
-def _evaluate(
-    blocks: list[_Block],
-    readers: list[set[int]],
-    values: FloatArray,
-    todo: set[int],
-    target: float,
-    allowed: float,
-) -> set[int]:
-    """Evaluates blocks, and those that read them, until none changes by more than the target.
-
-    Returns:
-        The blocks that changed by more than `allowed`.
-    """
-    moved: set[int] = set()
-    sweeps = _ALONE_BURST if len(blocks) == 1 else _BURST
-    for _ in range(_MAX_BURSTS):
-        active: set[int] = set()
-        for b in sorted(todo):
-            change = blocks[b].evaluate(values, sweeps)
-            if change > allowed:
-                moved.add(b)
-            if change > target:
-                active |= readers[b]
-        todo = active
-        if not todo:
+        moved = [b for b in sorted(dirty) if blocks[b].settle(values) > _NEARLY]
+        dirty = set().union(*(readers[b] for b in moved))
+        if not dirty:
             break
-    return moved
+    actions, found = np.empty(mdp.num_states, dtype=np.int64), np.empty(mdp.num_states)
+    found[order] = values
+    actions[order] = np.concatenate([block.actions for block in blocks])
+    return actions, found
 
 
 def _blocks(mdp: MDP, gamma: float, order: IntArray) -> tuple[list[_Block], list[set[int]]]:

@@ -11,8 +11,8 @@ import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
+from trdlab.tabular.chains import averaging
 from trdlab.tabular.mdp import MDP
-from trdlab.tabular.series import averaging
 from trdlab.tabular.solve import Solution, evaluate
 from trdlab.tabular.table import ExactTable
 

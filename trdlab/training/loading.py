@@ -1,8 +1,6 @@
 """The agent of a run: loaded as an Estimator, and evaluated."""
 
 from contextlib import suppress
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +12,7 @@ from trdlab.environments.making import check_imported
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
-from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
+from trdlab.rollouts.playing import Watch, part_of, unwatched, usual_limit
 from trdlab.runs import RunFolder, read_arrays
 from trdlab.training.machine import use_threads
 from trdlab.training.setup import future, make_environments
@@ -136,18 +134,13 @@ def evaluate_run(
                 epsilon=chance,
                 seed=seed + len(parts),  # a single batch, where there can be one
                 max_steps=_limit(environments, max_steps, settings.time_axis),
-                watch=partial(_watch_all, watch, sum(len(of.returns) for of in parts), count),
+                watch=part_of(watch, sum(len(of.returns) for of in parts), count),
             )
         )
     result = joined(parts)
     limit = f"-max-steps-{max_steps}" if max_steps else ""
     name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}{limit}.json"
     return result, _keep(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
-
-
-def _watch_all(watch: Watch, before: int, count: int, now: Progress) -> None:
-    """Tells how far episodes are of which some have been played before these."""
-    watch(replace(now, finished=before + now.finished, episodes=count))
 
 
 def _limit(environments: Environments, given: int | None, axis: TimeAxis) -> int | None:

@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from trdlab.explanations.comparison.findings import comparison_findings
 
 from trdlab.agents import Agent, find_pair, gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations import moment_at
-from trdlab.explanations.comparison import background, differences
+from trdlab.explanations.comparison.claims import nothing_differs, one_tells, sections, trusted
 from trdlab.explanations.comparison.comparing import compare
 from trdlab.explanations.comparison.comparison import Comparison, centre, compared
 from trdlab.explanations.comparison.states import Visits, visit
@@ -34,13 +33,11 @@ def changed(agent: Agent, change: Any) -> Agent:
 
 
 def kinds(comparison: Comparison) -> dict[str, Any]:
-    """Returns the findings by their kind, each of them tested."""
-    found = comparison_findings(comparison)
-    assert all(finding.holds(comparison) for finding in found)
-    return {finding.kind(): finding for finding in found}
+    """Returns the last claim of each kind that is made."""
+    return {claim.kind: claim for section in sections(comparison) for claim in section.claims}
 
 
-def told(
+def between(
     first: np.ndarray,
     second: np.ndarray,
     axis: TimeAxis,
@@ -100,30 +97,30 @@ def test_a_raised_component_is_found_there_and_by_that_much():
     assert (largest.component, largest.more, largest.less) == (2, "B", "A")
     assert largest.by == pytest.approx(0.5)
     assert found["expects-more"].more == "B"
-    assert found["most-at"].component == 2
-    assert found["most-at"].share == pytest.approx(1.0)
+    assert found["most-of-it"].components == (2,)
+    assert found["most-of-it"].share == pytest.approx(1.0)
     assert found["agreement"].share == 1.0
     assert found["of-any-action"].distance == pytest.approx(0.5)
 
 
 def test_rewards_shifted_by_a_step_are_later():
     first = np.tile([0.0, 1.0, 0.0, 0.0, 0.0], (12, 1))
-    comparison = told(first, np.roll(first, 1, axis=1), AXIS)
+    comparison = between(first, np.roll(first, 1, axis=1), AXIS)
     found = kinds(comparison)
     later = found["later-rewards"]
     assert (later.later, later.sooner, later.last_step) == ("B", "A", 1)
     assert (later.later_share, later.sooner_share) == (0.0, 1.0)
     assert comparison.shift.value == pytest.approx(1.0)
     assert found["same-in-all"].value == pytest.approx(1.0)
-    assert found["most-between"].last_step == 2
-    costs = kinds(told(-np.roll(first, 1, axis=1), -first, AXIS))["later-costs"]
+    assert found["most-of-it"].components == (1, 2)
+    costs = kinds(between(-np.roll(first, 1, axis=1), -first, AXIS))["later-costs"]
     assert (costs.later, costs.sooner) == ("A", "B")
 
 
 def test_what_is_neither_sooner_nor_later_is_only_said_by_when_it_comes():
     first = np.tile([0.5, 0.5, 0.0, 0.0], (12, 1))
     second = np.tile([0.6, 0.0, 0.0, 0.4], (12, 1))
-    found = kinds(told(first, second, TimeAxis(0.9, 3, 2)))
+    found = kinds(between(first, second, TimeAxis(0.9, 3, 2)))
     assert "later-rewards" not in found
     come = found["come-by"]
     assert (come.last_step, come.first_share) == (3, 1.0)
@@ -134,12 +131,12 @@ def test_an_interval_that_could_be_turned_round_is_not_claimed():
     rng = np.random.default_rng(0)
     first = rng.normal(size=(30, 3))
     second = first + rng.normal(size=(30, 1)) * [0.5, 0.0, 0.0]
-    comparison = told(first, second, TimeAxis(0.9, 2))
+    comparison = between(first, second, TimeAxis(0.9, 2))
     assert comparison.gap.low < 0.0 < comparison.gap.high
     found = kinds(comparison)
     assert "neither-surely-more" in found
     assert not {"expects-more", "largest-at"} & set(found)
-    alike = told(first, second, TimeAxis(0.9, 2), different=3)
+    alike = between(first, second, TimeAxis(0.9, 2), different=3)
     assert np.isnan(alike.gap.low)
     assert kinds(alike)["all-alike"].different == 3
     assert "expects-more" in kinds(alike)  # of these episodes, and no others
@@ -148,9 +145,9 @@ def test_an_interval_that_could_be_turned_round_is_not_claimed():
 def test_episodes_that_both_play_alike_tell_of_the_same_chance_once():
     rng = np.random.default_rng(0)
     first, second = rng.normal(size=(2, 30, 3))
-    once = told(first, second, TimeAxis(0.9, 2))
+    once = between(first, second, TimeAxis(0.9, 2))
     both = np.repeat(np.arange(30), 2)  # the states of A's episodes, and of B's, which are the same
-    twice = told(first[both], second[both], TimeAxis(0.9, 2), seed=both)
+    twice = between(first[both], second[both], TimeAxis(0.9, 2), seed=both)
     np.testing.assert_allclose(twice.difference.low, once.difference.low)
     np.testing.assert_allclose(twice.difference.high, once.difference.high)
 
@@ -208,7 +205,7 @@ def test_every_state_can_be_explained_by_the_one_who_came_there(is_random):
 
 def test_the_largest_disagreements_come_first_and_none_twice():
     first = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [2.0, 0.0], [5.0, 0.0]])
-    visits = told(first, np.zeros((5, 2)), TimeAxis(0.9, 1)).visits
+    visits = between(first, np.zeros((5, 2)), TimeAxis(0.9, 1)).visits
     assert visits.furthest(3) == [4, 3, 1]
     assert visits.furthest(9) == [4, 3, 1]
     assert visits.furthest(1) == [4]
@@ -226,9 +223,9 @@ def test_it_is_told_whose_forecasts_can_be_trusted():
     comparison = compare(
         agent, changed(agent, worse), episodes=5, judged_by=400, watch=heard.append
     )
-    found = kinds(comparison)
-    assert (found["trusted-all-along"].side, found["trusted-all-along"].step) == ("A", 3)
-    assert (found["trusted-up-to"].side, found["trusted-up-to"].step) == ("B", 1)
+    whom = [claim.sentence for claim in trusted(comparison)]
+    assert "A: Its forecasts are better than a guess about what comes within 4 steps." in whom
+    assert "B: Its forecasts are better than a guess about what comes within 2 steps." in whom
     assert list(dict.fromkeys(progress.what for progress in heard)) == [
         "episodes to compare at",
         "episodes to judge by A",
@@ -237,16 +234,18 @@ def test_it_is_told_whose_forecasts_can_be_trusted():
     assert (heard[-1].finished, heard[-1].episodes) == (400, 400)
 
 
-def test_different_futures_are_each_told():
+def test_different_futures_are_each_between():
     one = np.ones((12, 2))
-    comparison = told(one, 2 * one, TimeAxis(0.9, 1))
+    comparison = between(one, 2 * one, TimeAxis(0.9, 1))
     clipped = replace(
         comparison, futures=(Future("the policy"), Future("another", clip_rewards=True))
     )
-    tells = [f for f in comparison_findings(clipped) if isinstance(f, background.OneTells)]
-    assert [(f.side, f.policy) for f in tells] == [("A", "the policy"), ("B", "another")]
-    assert all(f.holds(clipped) for f in tells)
-    assert not differences.NothingDiffers().holds(clipped)
+    assert [claim.sentence for claim in one_tells(clipped)] == [
+        "A tells of the future of the policy: reward as the environment pays it, up to the end of "
+        "the episode.",
+        "B tells of the future of another: sign of each reward, up to the end of the episode.",
+    ]
+    assert nothing_differs(clipped) == []
 
 
 def test_a_pair_shares_what_is_said_of_exact_tables():
@@ -257,7 +256,7 @@ def test_a_pair_shares_what_is_said_of_exact_tables():
 @pytest.mark.parametrize(
     ("first", "second", "message"),
     [
-        (("ledge", AXIS), ("drone", AXIS), "they see 8 states and 14 states"),
+        (("ledge", AXIS), ("drone", AXIS), "they have 8 states and 14 states"),
         (("ledge", AXIS), ("ledge", TimeAxis(0.9, 4)), "discount factors differ: 0.95 and 0.9"),
     ],
 )
@@ -269,7 +268,7 @@ def test_what_cannot_be_compared(first, second, message):
 def test_other_actions_cannot_be_compared():
     agent = gridworld_agent("ledge", AXIS)
     turned = replace(agent, action_names=("down", "up", "left", "right"))
-    with pytest.raises(InputError, match="have the actions up, down, left, right and the actions"):
+    with pytest.raises(InputError, match=r"they have 4 actions \(up, down, left, right\) and 4"):
         compare(agent, turned)
     numbered = replace(agent, action_names=tuple(f"action {i}" for i in range(4)))
     compare(agent, numbered, episodes=2, judged_by=0)

@@ -26,7 +26,7 @@ NAMES = ("up", "down", "FIRE", "move left")
 WORDS = {
     "better": "worse",
     "worse": "better",
-    "put off": "brought forward",
+    "delayed": "brought",
     "ended": "was cut off",
     "was cut off": "ended",
     "and never came": "and came",
@@ -123,7 +123,7 @@ def episodes(draw: st.DrawFn) -> Played:
 def mutations(sentence: str, names: tuple[str, ...] = NAMES) -> list[str]:
     """Returns the sentence with each number changed in its last digit, other words and names."""
     result = [*mutants.numbers(sentence), *mutants.words(sentence, WORDS)]
-    named = re.match(rf"At step \d+ ({'|'.join(names)})\b", sentence, re.IGNORECASE)
+    named = re.match(rf"(?:After )?({'|'.join(names)}) at step", sentence, re.IGNORECASE)
     if named:
         others = [name for name in ("sideways", *names) if name.lower() != named[1].lower()]
         result += [sentence.replace(named[1], name, 1) for name in others]
@@ -167,7 +167,7 @@ def test_every_sentence_about_any_episode_is_supported(played: Played):
     story = tell(played)
     assert read(" ".join(said(story.claims)), played) == said(story.claims)
     assert len(story.claims) <= 8
-    assert all(len(text.split()) <= 32 for text in said(story.claims))
+    assert all(len(text.split()) <= 38 for text in said(story.claims))
     assert story.most is None or story.most in story.moments
 
 
@@ -202,9 +202,9 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
 
 def test_a_story_reads_well():
     assert said(tell(real()[0]).claims) == [
-        "At the start it expected rewards worth 3.52, the largest part in 1 step.",
+        "At the start the agent expected rewards worth 3.52, the largest part 1 step later.",
         "A reward of 1 at step 3 was foreseen 3 steps before, as early as it could be.",
         "No step changed what it expected.",
         "The episode ended after 5 steps.",
-        "Counted from the start it got rewards worth 3.52, as it had expected.",
+        "Seen from the start it got rewards worth 3.52, as it had expected.",
     ]

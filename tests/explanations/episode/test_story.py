@@ -68,24 +68,24 @@ def test_each_surprise_has_its_reason():
         place(claim): claim.sentence for claim in tell(changed).moments if "gap" in claim.fields
     }
     assert turns == {
-        0: "At step 0 wait turned out 0.125 better than expected, mainly because what it expects "
-        "in 4 steps or later went from 0 to 0.125.",
-        1: "At step 1 wait turned out 0.25 worse than expected, mainly because what it expects in "
-        "3 steps went from 0.25 to 0.",
+        0: "After wait at step 0 it expected 0.125 more than before, mainly because what it "
+        "expects after the first 4 steps went from 0 to 0.125.",
+        1: "After wait at step 1 it expected 0.25 less than before, mainly because what it "
+        "expects 3 steps later went from 0.25 to 0.",
     }
     more = played(foretold([0.0, 0.5]), [0.0, 2.0])
     assert said(tell(more).moments) == [
-        "At step 1 wait turned out 1.5 better than expected, mainly because a reward of 2 came "
+        "Wait at step 1 turned out 1.5 better than expected, mainly because a reward of 2 came "
         "where 0.5 was expected."
     ]
     none = played(foretold([0.0, 0.5]), [0.0, 0.0])
     assert said(tell(none).moments) == [
-        "At step 1 wait turned out 0.5 worse than expected, mainly because nothing came where 0.5 "
+        "Wait at step 1 turned out 0.5 worse than expected, mainly because nothing came where 0.5 "
         "was expected."
     ]
     early = played(foretold([1.0, 1.0, 1.0, 1.0])[:3], [1.0, 1.0])
     assert said(tell(early).moments) == [
-        "At step 1 wait turned out 0.75 worse than expected, mainly because the episode ended "
+        "Wait at step 1 turned out 0.75 worse than expected, mainly because the episode ended "
         "while rewards worth 0.75 were still expected."
     ]
 
@@ -94,7 +94,7 @@ def test_a_cost_is_not_called_a_reward():
     hurt = played(foretold([0.0, -0.5]), [0.0, -2.0])
     assert "mainly because a cost of 2 came" in said(tell(hurt).moments)[0]
     assert said(tell(hurt).start) == [
-        "At the start it expected costs worth 0.25, the largest part in 1 step."
+        "At the start the agent expected costs worth 0.25, the largest part 1 step later."
     ]
 
 
@@ -106,11 +106,11 @@ def test_a_reward_that_comes_at_another_step_is_one_of_timing():
     rows[3] = [1.0, 0.0, 0.0, 0.0, 0.0]
     late = played(rows, [0.0, 0.0, 0.0, 1.0])
     assert tell(late).moments[0].sentence == (
-        "At step 1 wait put off rewards worth 0.25, now expected in 2 steps, not now; the total "
-        "hardly changed."
+        "Wait at step 1 delayed rewards worth 0.25: they were to come at once, and now 2 steps "
+        "later; all together it expects about the same."
     )
     costly = played(-rows, [0.0, 0.0, 0.0, -1.0])
-    assert "put off costs worth 0.25" in tell(costly).moments[0].sentence
+    assert "delayed costs worth 0.25" in tell(costly).moments[0].sentence
 
 
 def test_key_moments_are_spread_over_the_episode():
@@ -140,15 +140,15 @@ def test_where_nothing_surprises_nothing_is_made_of_it():
 
 def test_what_came_is_held_against_what_was_expected_only_where_it_is_known():
     rows, rewards = foretold([1.0, 1.0]), [1.0, 3.0]
-    other = "Counted from the start it got rewards worth 2.5; it had expected 1.5."
+    other = "Seen from the start it got rewards worth 2.5; it had expected 1.5."
     assert tell(played(rows, rewards)).end[-1].sentence == other
-    same = "Counted from the start it got rewards worth 1.5, as it had expected."
+    same = "Seen from the start it got rewards worth 1.5, as it had expected."
     assert tell(played(rows, [1.0, 1.0])).end[-1].sentence == same
     assert tell(played(rows, rewards, terminated=False)).end[-1].kind == "cut-off"
     ends = np.array([True, True])
     lost = played(rows, rewards, life_lost=np.array([True, False]), ends=ends)
     assert tell(lost).end[-1].sentence == (
-        "Counted from the start it got rewards worth 1 up to step 0, where a life was lost; it had "
+        "Seen from the start it got rewards worth 1 up to step 0, where a life was lost; it had "
         "expected 1.5."
     )
 

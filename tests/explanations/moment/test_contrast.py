@@ -10,6 +10,7 @@ import pytest
 from moments import GAMMA, choice, moment, of_kind, said, told, trusted
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
+from trdlab.estimator import Future
 from trdlab.explanations.moment.exact import gridworld_moment
 from trdlab.explanations.moment.moment import Choice, moment_of
 from trdlab.explanations.moment.telling import in_brief
@@ -22,7 +23,7 @@ def test_the_drone_prefers_down_because_it_pays_sooner():
     assert (of.action, of.foil) == ("down", "up")
     sooner, discount, first, flip = in_brief(of)
     assert sooner.sentence == (
-        "Down gives more immediate rewards: 2.71 within 4 steps, where up gives nothing."
+        "Down gives more immediate rewards: 2.71 in the first 4 steps, where up gives nothing."
     )
     assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
     assert discount.sentence == (
@@ -31,8 +32,8 @@ def test_the_drone_prefers_down_because_it_pays_sooner():
     )
     assert discount.better_value == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4)
     assert discount.worse_value == pytest.approx(4 * GAMMA**4)
-    assert first.sentence == "After down the first reward comes in 1 step: 1."
-    assert flip.sentence == "Up would be better if each coin paid less than 0.924 instead of 1."
+    assert first.sentence == "With down, the first reward comes 1 step later: it is 1."
+    assert flip.sentence == "Up would be better if the coins paid less than 0.924 instead of 1."
 
 
 def test_the_fewest_steps_that_justify_down_are_those_of_its_three_coins():
@@ -42,8 +43,8 @@ def test_the_fewest_steps_that_justify_down_are_those_of_its_three_coins():
     assert reasons.advantage == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
     assert reasons.disadvantage == pytest.approx(3 * GAMMA**4)
     assert reasons.sentence == (
-        "What comes in 1 to 3 steps is enough to prefer down: 2.71 more there, against 2.44 for "
-        "up elsewhere."
+        "What comes 1 to 3 steps later is enough to make down better: it is 2.71 ahead then, and "
+        "2.44 behind otherwise."
     )
 
 
@@ -67,7 +68,7 @@ def test_the_action_is_what_the_policy_does_even_if_that_is_to_stay():
     assert of.action != "right"
     assert of.foil == "right"
     assert said(of, "decided-at") == [
-        f"What decides comes now: {of.action} pays nothing and right costs 1."
+        f"What comes at once decides: {of.action} pays nothing then and right costs 1."
     ]
 
 
@@ -75,7 +76,7 @@ def test_without_another_action_that_moves_there_is_nothing_to_compare():
     of = choice("corridor")
     assert (of.action, of.foil) == ("right", None)
     assert in_brief(of)[0].sentence == (
-        "All other actions stay here, or most likely do, so there is nothing to compare."
+        "Every other action leaves things as they are, or most likely does, so nothing is compared."
     )
 
 
@@ -86,7 +87,9 @@ def test_to_fall_off_a_cliff_is_no_bump():
     assert of.moment.stays[of.moment.index("left")] == 1.0
     (decided,) = of_kind(of, "decided-at")
     assert decided.component == 0
-    assert decided.sentence == "What decides comes now: up pays nothing and right costs 100."
+    assert (
+        decided.sentence == "What comes at once decides: up pays nothing then and right costs 100."
+    )
 
 
 def test_where_the_episode_is_over_that_is_all_there_is_to_say():
@@ -123,7 +126,8 @@ def test_what_depends_on_how_a_tie_was_broken_says_so():
     of = choice("tie")
     assert of.moment.tied == ("left", "right")
     assert said(of, "tied-actions") == [
-        "Left and right are equally good here, but pay differently; the agent takes left."
+        "Left and right are equally good here, but pay other amounts or at other times; the agent "
+        "takes left."
     ]
     assert said(of, "different-totals") == [
         "In total right brings 20 and left 19, with ties broken as here."
@@ -185,22 +189,22 @@ def pair(a: list[float], b: list[float], **known: Any) -> Choice:
         (
             [0] * 9 + [2, 0],
             [0] * 11,
-            "What decides comes in 9 steps: a pays 2 and b pays nothing, on average.",
+            "What comes 9 steps later decides: a pays 2 then and b pays nothing, on average.",
         ),
         (
             [0] * 9 + [1, 1, 0, 0],
             [0] * 12 + [3],
-            "Within 11 steps a pays 2 and b pays nothing, on average.",
+            "In the first 11 steps a gains 2 and b gains nothing, on average.",
         ),
         (
             [-0.5, 2, 0, 0, 0],
             [-1, 0, 0, 1, 0],
-            "Within 2 steps, costs and rewards together, a pays 1.5 and b costs 1, on average.",
+            "In the first 2 steps a gains 1.5 and b loses 1, on average.",
         ),
         (
             [-0.5, -0.5, 3, 0],
             [-1, -1, 3, 0],
-            "A costs less: 1 within 2 steps, where b costs 2, on average.",
+            "A costs less: 1 in the first 2 steps, where b costs 2, on average.",
         ),
     ],
 )
@@ -218,14 +222,15 @@ def test_what_makes_up_for_a_lead_follows_it():
     of = pair([0.0, 0.0, 3.0], [1.0, 1.0, 0.2])
     assert [claim.kind for claim in in_brief(of)[:3]] == ["more-immediate", "makes-up", "better"]
     assert said(of, "makes-up") == [
-        "But what comes in 2 steps or later decides: there a pays 2.8 more than b, on average."
+        "But what comes after the first 2 steps decides: a pays 2.8 more then than b, on average."
     ]
 
 
 def test_crossings_are_found_at_their_step():
     of = pair([0.0, 0.0, 3.0, 0.0], [1.0, 0.5, 0.0, 0.0])
     assert said(of, "overtakes") == [
-        "A overtakes b in 2 steps: up to then a pays 3 and b pays 1.5, on average."
+        "After the first 3 steps a has overtaken b: added up, it gains 3 and b gains 1.5, on "
+        "average."
     ]
 
 
@@ -234,7 +239,7 @@ def test_an_equal_level_is_no_lead_and_the_residual_is_not_spoken_of_step_by_ste
     assert not of_kind(level, "overtakes")
     ahead = pair([1, 0, 0, 0.5], [0, 0.5, 0, 0])
     assert said(ahead, "never-behind") == [
-        "A is never behind b in the next 3 steps, nor in the end."
+        "Added up step by step, a is never behind b: not in the first 3 steps, nor in the end."
     ]
     grouped = moment([[1, 0, 0.5], [0, 0.5, 0]], width=2).choice("a", "b")
     assert not of_kind(grouped, "never-behind")
@@ -251,7 +256,7 @@ def test_a_lead_that_may_be_noise_is_not_called_sooner():
 def test_next_to_nothing_is_no_lead():
     rows = [[0.0, 0.0, 0.0, -0.0004, 1.85], [0.0, 0.0, 0.0, 0.0, 1.77]]
     of = moment(rows, totals=np.array([2.0, 1.9])).choice("a", "b")
-    assert said(of, "next-to-nothing") == ["Hardly anything is expected of a within 4 steps."]
+    assert said(of, "next-to-nothing") == ["Hardly anything is expected of a in the first 4 steps."]
     assert not of_kind(of, "costs-less")
     assert of_kind(of, "better")
 
@@ -266,8 +271,8 @@ def test_a_difference_that_cannot_be_trusted_is_not_discussed():
     (doubt,) = of_kind(of, "untested-difference")
     assert doubt.share == pytest.approx(3.0 / 4.5)
     assert doubt.sentence == (
-        "67 % of the difference between a and b comes in 3 steps or later, and that is not to be "
-        "trusted."
+        "67 % of the difference between a and b comes after the first 3 steps, and that is not to "
+        "be trusted."
     )
     silent = replace(trusted(axis, 3), status=("good", "good", "good", "not tested"))
     (untested,) = of_kind(moment(rows, trust=silent).choice("a", "b"), "untested-difference")
@@ -310,3 +315,11 @@ def test_a_given_policy_has_no_what_ifs_and_is_named():
     of = gridworld_moment(world, table, 0).choice("down", "up")
     assert not of_kind(of, "flips")
     assert said(of, "decided-by") == ["After the first action, the given policy acts."]
+
+
+def test_whose_future_it_is_says_what_counts():
+    signs = Future("the greedy policy", clip_rewards=True, life_loss_ends=True)
+    of = replace(moment([[1.0, 0.0], [0.0, 0.0]]), future=signs).choice("a", "b")
+    assert said(of, "signs-count") == ["Of each reward only the sign counts."]
+    assert said(of, "ended-by") == ["All steps count, up to a lost life, or the end of the game."]
+    assert not of_kind(choice(), "signs-count")

@@ -21,9 +21,9 @@ def one(row: list[float], **known: Any) -> Choice:
 def test_what_the_drone_expects_of_down():
     of = choice()
     assert [claim.sentence for claim in forecast(of)] == [
-        "After down the first reward comes in 1 step: 1.",
-        "23 % of what down is worth comes in 4 steps or later.",
-        "What down pays within 4 steps comes 2.0 steps from now on average.",
+        "With down, the first reward comes 1 step later: it is 1.",
+        "23 % of what down is worth comes after the first 4 steps.",
+        "What down pays in the first 4 steps comes 2.0 steps later on average.",
     ]
     (share,) = of_kind(of, "share-beyond")
     assert share.share == pytest.approx(GAMMA**4 / (GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4))
@@ -32,7 +32,7 @@ def test_what_the_drone_expects_of_down():
         (GAMMA + 2 * GAMMA**2 + 3 * GAMMA**3) / (GAMMA + GAMMA**2 + GAMMA**3)
     )
     assert said(choice(axis=TimeAxis(GAMMA, 6)), "surely-over") == [
-        "After down the episode is over within 5 steps."
+        "With down, the episode ends in the first 5 steps."
     ]
 
 
@@ -43,13 +43,15 @@ def test_what_is_not_defined_is_not_said():
     grouped = moment([[1.0, 2.0, 0.5], [0.0, 0.0, 0.2]], width=3).choice("a", "b")
     assert not of_kind(grouped, "centre-of-mass")
     assert said(grouped, "first-expected") == [  # the discount inside a group cannot be taken out
-        "After a the first reward is expected within 3 steps: worth 1 on average."
+        "With a, the first reward to expect comes in the first 3 steps: worth 1 on average."
     ]
 
 
 def test_costs_are_not_called_rewards():
     of = moment([[-1.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]).choice("a", "b")
-    assert said(of, "first-expected") == ["After a the first cost is expected now: 1 on average."]
+    assert said(of, "first-expected") == [
+        "With a, the first cost to expect comes at once: 1 on average."
+    ]
     assert not of_kind(of, "peak")
 
 
@@ -61,7 +63,8 @@ def test_a_chance_is_told_where_there_is_any():
     of = choice(world, TimeAxis(0.9, 6), action="right", foil="up")
     # two moves to the right in a row succeed with 1/4: then 4 is paid at t+1
     assert said(of, "first-chance") == [
-        "After right the first reward can come in 1 step: 4, with a 25 % chance."
+        "With right, a reward of 4 can come 1 step later at the earliest; the chance that it comes "
+        "then is 25 %."
     ]
     (varies,) = of_kind(of, "give-or-take")
     assert 0 < varies.deviation < 2
@@ -86,22 +89,24 @@ def test_a_chance_is_told_only_of_what_matters():
     assert not of_kind(chancy((small, small), beyond=7.0), "either-or")
     risk = chancy((large, {0.0: 0.96, -4.0: 0.04}))
     assert said(risk, "first-of-several") == [
-        "After a the first reward can come now, with a 50 % chance."
+        "With a, a reward can come at once; the chance that it comes then is 50 %."
     ]
     assert said(risk, "first-chance") == [
-        "After a the first cost can come in 1 step: 4, with a 4 % chance."
+        "With a, a cost of 4 can come 1 step later at the earliest; the chance that it comes then "
+        "is 4 %."
     ]
     assert not of_kind(risk, "either-or")  # it is the first cost, and told as that
     twice = chancy(({0.0: 0.98, -4.0: 0.02}, large, {0.0: 0.9, -4.0: 0.1}))
-    assert said(twice, "either-or") == ["There is a 10 % chance that a costs 4 in 2 steps."]
+    assert said(twice, "either-or") == ["There is a 10 % chance that a costs 4, 2 steps later."]
 
 
 def test_the_first_cost_is_the_first_step_that_can_cost_something():
     steps = ({-0.1: 1.0}, {-0.1: 0.5, 2.0: 0.5}, {-0.1: 1.0})  # the mean of the second is positive
     of = chancy(steps)
-    assert said(of, "first-reward") == ["After a the first cost comes now: 0.1."]
+    assert said(of, "first-reward") == ["With a, the first cost comes at once: it is 0.1."]
     assert said(of, "first-chance") == [
-        "After a the first reward can come in 1 step: 2, with a 50 % chance."
+        "With a, a reward of 2 can come 1 step later at the earliest; the chance that it comes "
+        "then is 50 %."
     ]
 
 
@@ -117,7 +122,7 @@ def test_nothing_is_forecast_that_cannot_be_trusted():
     row = [0.0, 0.0, 0.9, 0.0, 2.0, 0.0]
     assert forecast(judged(row, 0, False)) == []
     assert [claim.sentence for claim in forecast(judged(row, 2, False))] == [
-        "Nothing is expected of a within 2 steps."
+        "Nothing is expected of a in the first 2 steps."
     ]
     kinds = {claim.kind for claim in forecast(judged(row, 4, False))}
     assert kinds == {"first-expected"}  # and no peak at t+4, nor a share beyond t+5
@@ -153,7 +158,7 @@ def test_no_chance_is_read_from_a_group():
 def test_an_error_is_told_where_it_is_as_large_as_half_of_what_is_expected():
     row = [0.0, 0.8, 0.0, 0.0]
     large = judged(row, 3, True, error=np.array([0.1, 0.4, 0.1, 0.1]))
-    assert said(large, "off-by") == ["Forecasts of what comes in 1 step are off by about 0.4."]
+    assert said(large, "off-by") == ["Forecasts of what comes 1 step later are off by about 0.4."]
     for error in ([0.5, 0.39, 0.5, 0.5], [np.nan] * 4):
         assert not of_kind(judged(row, 3, True, error=np.array(error)), "off-by")
 
@@ -161,7 +166,7 @@ def test_an_error_is_told_where_it_is_as_large_as_half_of_what_is_expected():
 def test_the_centre_is_told_in_steps_where_no_rhythm_is():
     several = one([0.0, 1.0, 0.0, 0.0, 0.0, 3.0, 0.0])
     assert said(several, "centre-of-mass") == [  # (1 + 3 · 5) / 4
-        "What a pays within 6 steps comes 4.0 steps from now on average."
+        "What a pays in the first 6 steps comes 4.0 steps later on average."
     ]
     regular = one([0.0, 1.0, 0.0] * 5)
     assert of_kind(regular, "rhythm")

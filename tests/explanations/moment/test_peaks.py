@@ -47,13 +47,18 @@ def test_a_rhythm_is_found_under_noise_on_a_slope_and_of_costs(seed, sign, slope
     assert np.abs(np.array(found) - [3, 11, 19, 27, 35]).max() <= 1
     what = "reward" if sign > 0 else "cost"
     said = told(moment)["rhythm"]
-    assert said.startswith(f"Within 40 steps the {what} expected after go peaks every ")
-    assert said.endswith(f"first in {found[0]} steps and last in {found[-1]} steps.")
+    assert said.startswith(f"In the first 40 steps the {what} expected of go peaks every ")
+    assert said.endswith(
+        f"the first time {found[0]} steps later, the last time {found[-1]} steps later."
+    )
 
 
 def test_a_period_is_told_from_its_shortest_to_its_longest():
     said = told(learned(bumps(3, 11, 19, 27, 35), seconds_per_step=1 / 15))
-    assert "every 8 steps, first in 3 steps (0.2 s) and last in 35 steps" in said["rhythm"]
+    assert (
+        "every 8 steps, the first time 3 steps later (0.2 s), the last time 35 steps later"
+        in said["rhythm"]
+    )
     assert "every 7 to 9 steps" in told(learned(bumps(3, 11, 20, 27, 35)))["rhythm"]
 
 
@@ -61,7 +66,7 @@ def test_what_comes_at_uneven_times_has_peaks_and_no_rhythm():
     said = told(learned(bumps(3, 9, 22, 32) + noise(0)))
     assert "rhythm" not in said
     assert said["several-peaks"].endswith(
-        "peaks in 3 steps, in 9 steps, in 22 steps and in 32 steps."
+        "peaks 3 steps later, 9 steps later, 22 steps later and 32 steps later."
     )
 
 
@@ -76,7 +81,7 @@ def test_of_many_peaks_the_most_prominent_are_named():
     row = np.zeros(41)
     row[[2, 4, 11, 15, 17, 30]] = [1.0, 0.5, 0.9, 0.6, 0.8, 0.7]
     assert told(learned(row))["several-peaks"].endswith(
-        "peaks in 2 steps, in 11 steps, in 17 steps and in 30 steps."
+        "peaks 2 steps later, 11 steps later, 17 steps later and 30 steps later."
     )
 
 
@@ -89,18 +94,18 @@ def test_the_largest_is_that_without_the_discount():
     row[[2, 15]] = [1.0, 1.5]  # 0.90 and 0.69 now
     said = told(learned(row))
     assert said["peak"] == (
-        "The largest reward after go within 20 steps comes in 15 steps: it is worth 0.695 now."
+        "The largest reward of go in the first 20 steps comes 15 steps later: it is worth 0.695."
     )
 
 
 def test_a_reward_that_hardly_varies_has_no_peak_and_is_called_the_same():
     said = told(learned(1.0 + np.clip(noise(0, 0.01), -0.02, 0.02)))
     (first, *_) = said.values()
-    assert first.startswith("Each of the next 40 steps pays ")
-    assert first.endswith(" after go on average.")
+    assert first.startswith("With go, each of the first 40 steps pays ")
+    assert first.endswith(" on average.")
     assert not {"peak", "several-peaks", "rhythm", "spread"} & set(said)
     assert told(learned(-np.ones(11)))["steady"] == (
-        "Each of the next 10 steps costs 1 after go on average."
+        "With go, each of the first 10 steps costs 1 on average."
     )
     assert "steady" not in told(learned(1.0 + 0.2 * STEPS / 40.0))
 
@@ -108,7 +113,7 @@ def test_a_reward_that_hardly_varies_has_no_peak_and_is_called_the_same():
 def test_a_wide_peak_is_said_to_be_uncertain_or_drawn_out_but_not_of_what_is_exact():
     moment = learned(bumps(8, width=2.0))
     # half of its height is reached 2.35 steps away
-    assert "in 8 steps is spread over 5 steps:" in told(moment)["spread"]
+    assert "8 steps later is spread over 5 steps:" in told(moment)["spread"]
     assert "spread" not in told(learned(bumps(8, width=0.5)))
     known = Moment(moment.decomposition, ("go",), moment.future, totals=np.array([5.0]))
     assert "spread" not in told(known)

@@ -61,7 +61,9 @@ def test_polynomials_flip_at_their_roots(places: list[int], shift: float, sign: 
 
 
 def test_treasure_4_never_flips_over_gamma_and_treasure_5_flips_once():
-    assert said(choice(), "never-flips") == ["No searched value of γ makes up better than down."]
+    assert said(choice(), "never-flips") == [
+        "No value that was tried for γ makes up better than down."
+    ]
     richer = choice(Gridworld(load_map("drone").with_value("treasure", 5)))
     flip = next(claim for claim in of_kind(richer, "flips") if claim.quantity == "γ")
     # 1 + γ + γ² = 4 γ³
@@ -76,7 +78,7 @@ def test_the_treasure_and_the_coins_that_flip_the_preference():
     treasure = 1 + GAMMA**-1 + GAMMA**-2 + GAMMA**-3
     assert treasure == pytest.approx(4.3270, abs=5e-5)
     assert at["the treasure"] == pytest.approx((treasure,), abs=1e-9)
-    assert at["each coin"] == pytest.approx((4 / treasure,), abs=1e-9)
+    assert at["the coins"] == pytest.approx((4 / treasure,), abs=1e-9)
     assert "Up would be better if the treasure paid more than 4.33 instead of 4." in said(
         choice(), "flips"
     )
@@ -94,15 +96,15 @@ def test_what_lies_between_two_flips_is_said_to():
     of = replace(known, what_ifs=(dip,)).choice("a", "b")
     assert said(of, "flips") == ["B would be better if γ were between 0.2 and 0.6 instead of 0.9."]
     assert said(of, "several-flips") == [
-        "In all, the preference changes where γ is 0.20000 and 0.60000."
+        "In all, the preference changes at these values of γ: 0.20000 and 0.60000."
     ]
-    cost = WhatIf("each hazard", -4.0, -40.0, 0.0, lambda x: np.array([-1.0 - x, 0.0]))
+    cost = WhatIf("the hazards", -4.0, -40.0, 0.0, lambda x: np.array([-1.0 - x, 0.0]))
     of = replace(known, what_ifs=(cost,)).choice("a", "b")
-    assert said(of, "flips") == ["B would be better if each hazard cost less than 1 instead of 4."]
+    assert said(of, "flips") == ["B would be better if the hazards cost less than 1 instead of 4."]
 
 
 def test_what_was_searched_is_said():
     assert said(choice(), "searched") == [
-        "Searched were 65 values each, with the best policy for each: γ from 0.01 to 0.99, each "
-        "coin from 0 to 10 and the treasure from 0 to 40."
+        "65 values of each were tried, every one with its own best policy: γ from 0.01 to 0.99, "
+        "the coins from 0 to 10 and the treasure from 0 to 40."
     ]

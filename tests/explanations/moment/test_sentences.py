@@ -183,7 +183,7 @@ def read_back(choice: Choice) -> None:
     found = check(" ".join(claim.sentence for claim in claims), [(CHOICES, choice)])
     assert [claim.sentence for claim in found] == [claim.sentence for claim in claims]
     for claim in (*claims, *in_brief(choice)):
-        assert len(claim.sentence.split()) <= 36, claim.sentence  # slots may hold several words
+        assert len(claim.sentence.split()) <= 40, claim.sentence  # slots may hold several words
     assert len(in_brief(choice)) <= 5
 
 
@@ -229,7 +229,8 @@ def test_every_kind_of_claim_occurs(of_maps: list[Choice], of_learned: list[Choi
         seen.update(claim.kind for claim in told(moment.choice(*moment.action_names[:2])))
 
     collect()
-    elsewhere = {"nothing-on-average", "zero-on-average"}  # see test_contrast, test_forecast
+    # held by examples in test_contrast and test_forecast
+    elsewhere = {"nothing-on-average", "zero-on-average", "first-of-several", "signs-count"}
     assert set(CHOICES.rules) - seen <= elsewhere
 
 
@@ -330,5 +331,6 @@ def test_a_wrong_number_is_named(of_maps: list[Choice]):
         UnsupportedSentenceError, match=r"worth 0\.96\.' is not true of this moment"
     ):
         check(
-            "After down the first reward comes within 2 steps: worth 0.96.", [(CHOICES, of_maps[0])]
+            "With down, the first reward comes in the first 2 steps: it is worth 0.96.",
+            [(CHOICES, of_maps[0])],
         )

@@ -38,7 +38,8 @@ class CalibrationReport(Printable):
         foils: how well the components of actions were predicted that the policy would not have
             taken; None where states were not copied, or where there is no other action.
         scale: the largest component, of any action, by its absolute value.
-        chance: whether steps of which the same was expected went differently.
+        chance: whether steps of which the same was expected went differently, or it was seen that
+            copies share their chance.
         seconds_per_step: how long a step takes as people play, if that is known.
         lost: why there is no ceiling and there are no foils though they were asked for, else empty.
     """
@@ -107,8 +108,9 @@ def judge(
     """
     samples = pool(episodes)
     axis = samples.time_axis
-    for copied in (branches, foils):
-        if copied is not None and copied.time_axis != axis:
+    copies = [of for of in (branches, foils) if of is not None]
+    for copied in copies:
+        if copied.time_axis != axis:
             raise InputError(
                 f"The episodes are of {axis}, the copies of {copied.time_axis}.",
                 "Play both with the same estimator.",
@@ -126,7 +128,7 @@ def judge(
         ceiling=None if branches is None else ceiling_of(branches, seed=seed),
         foils=None if foils is None else calibrate(foils.samples, seed=seed),
         scale=max(float(np.abs(of.decomposition.components).max()) for of in episodes),
-        chance=_has_chance(episodes),
+        chance=_has_chance(episodes) or any(of.shared_chance for of in copies),
         seconds_per_step=seconds_per_step,
     )
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trdlab.rollouts.episodes import Episode
+from trdlab.rollouts.episodes import Episode, distinct
 from trdlab.statistics import FEWEST_EPISODES, Estimate, bootstrap
 
 
@@ -52,13 +52,13 @@ def score_of(episodes: Sequence[Episode], *, seed: int = 0) -> Score:
     """
     returns = np.array([episode.rewards.sum() for episode in episodes])
     mean = bootstrap(returns, rng=np.random.default_rng(seed))
-    played = {(e.actions.tobytes(), e.rewards.tobytes(), e.expected.tobytes()) for e in episodes}
-    if len(played) < FEWEST_EPISODES and np.ptp(returns) > 0.0:
+    different = len(distinct(episodes))
+    if different < FEWEST_EPISODES and np.ptp(returns) > 0.0:
         mean = Estimate(mean.value, np.nan, np.nan)
     limits = {episode.time_limit for episode in episodes}
     return Score(
         episodes=len(episodes),
-        different=len(played),
+        different=different,
         steps=sum(len(episode) for episode in episodes),
         epsilon=max(episode.epsilon for episode in episodes),
         returns=mean,

@@ -66,7 +66,9 @@ def nothing_differs(comparison: Comparison) -> Iterator[Fields]:
         yield {}
 
 
-@COMPARISONS.rule("Both expect {value:number} on average, though not the same everywhere.")
+@COMPARISONS.rule(
+    "Both expect {value:number} on average, though not the same of every action at every state."
+)
 def same_in_all(comparison: Comparison) -> Iterator[Fields]:
     if comparison.gap.value == 0.0 and comparison.visits.of_any_action.any():
         yield {"value": float(values(comparison)[0])}
@@ -109,17 +111,20 @@ def of_any_action(comparison: Comparison) -> Iterator[Fields]:
         yield {"distance": float(apart.mean())}
 
 
-@COMPARISONS.rule("They would take the same action at {share:percent} of the states.")
+@COMPARISONS.rule("They would take the same action in {share:percent} of the states.")
 def agreement(comparison: Comparison) -> Iterator[Fields]:
+    """Of two who expect the same everywhere that is said only where they act otherwise."""
     one, other = comparison.visits.actions
-    yield {"share": float((one == other).mean())}
+    share = float((one == other).mean())
+    if share < 1.0 or comparison.visits.of_any_action.any():
+        yield {"share": share}
 
 
 # ---- when --------------------------------------------------------------------------------------
 
 
 @COMPARISONS.rule(
-    "The largest difference comes {component:when}: there {more:text} expects {by:number} more "
+    "They differ most in what comes {component:when}: {more:text} expects {by:number} more of it "
     "than {less:text} on average."
 )
 def largest_at(comparison: Comparison) -> Iterator[Fields]:
@@ -133,7 +138,7 @@ def largest_at(comparison: Comparison) -> Iterator[Fields]:
         yield {"component": c, **sides, "by": abs(float(mean[c]))}
 
 
-@COMPARISONS.rule("{share:percent} of their difference lies {components:whens}.")
+@COMPARISONS.rule("{share:percent} of their difference comes {components:whens}.")
 def most_of_it(comparison: Comparison) -> Iterator[Fields]:
     """The fewest components in a row that hold most of the difference; of equals the fullest."""
     size = np.abs(comparison.visits.difference).mean(axis=0)
@@ -214,7 +219,7 @@ def _apart(comparison: Comparison, sign: float) -> Iterator[tuple[FloatArray, in
 
 
 @COMPARISONS.rule(
-    "At {step:step} of {side:text}'s episode with seed {seed:count}: A would do {first_action} and "
+    "At {step:step} of {side:text}'s episode with seed {seed:text}: A would do {first_action} and "
     "expects {first_value:number}, B {second_action} and {second_value:number}."
 )
 def furthest_apart(comparison: Comparison) -> Iterator[Fields]:

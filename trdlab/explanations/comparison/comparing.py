@@ -97,5 +97,5 @@ def check_comparable(first: Agent, second: Agent) -> None:
 
 
 def _words(agent: Agent) -> tuple[str, ...]:
-    """Returns what names an agent on the command line; nothing where it has no such name."""
+    """Returns what names an agent on the command line, if it has such a name."""
     return agent.origin.words if agent.origin else ()

@@ -13,14 +13,7 @@ from trdlab.explanations.comparison.states import Visits
 from trdlab.explanations.rules import Language
 from trdlab.explanations.words import forms_of
 from trdlab.printable import Printable
-from trdlab.statistics import (
-    FEWEST_EPISODES,
-    Estimate,
-    Estimates,
-    draws,
-    percentiles,
-    pooled,
-)
+from trdlab.statistics import FEWEST_EPISODES, Estimate, Estimates, draws, percentiles, pooled
 
 SIDES = ("A", "B")
 """What the two are called."""
@@ -76,6 +69,14 @@ class Comparison(Printable):
         """What the components mean."""
         return self.visits.time_axis
 
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """Who A and who B is; in full where their names do not tell."""
+        names = self.names
+        if names[0] == names[1] and all(self.words):
+            names = self.words[0][0], self.words[1][0]
+        return tuple(f"{side}: {name}" for side, name in zip(SIDES, names, strict=True))
+
 
 COMPARISONS = Language[Comparison](
     "this comparison", lambda of: forms_of(of.time_axis, of.seconds_per_step)
@@ -119,25 +120,21 @@ def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
     found = percentiles(values, visits.different >= FEWEST_EPISODES)
     exists = ~np.isnan(found.value)
     found = found.where(exists, exists)
-    parts = [_part(found, slice(i * size, (i + 1) * size)) for i in range(5)]
+    ends = [of[: 5 * size].reshape(5, size) for of in (found.value, found.low, found.high)]
+    means, difference, apart, of_any_action = (
+        Estimates(*(end[part] for end in ends)) for part in (slice(2), 2, 3, 4)
+    )
     return Comparison(
         visits=visits,
-        means=Estimates(*(np.stack([getattr(p, x) for p in parts[:2]]) for x in _ENDS)),
-        difference=parts[2],
-        apart=parts[3],
-        of_any_action=parts[4],
+        means=means,
+        difference=difference,
+        apart=apart,
+        of_any_action=of_any_action,
         agreement=found[5 * size],
         gap=found[5 * size + 1],
         shift=found[5 * size + 2],
         **told,
     )
-
-
-_ENDS = ("value", "low", "high")
-
-
-def _part(found: Estimates, which: slice) -> Estimates:
-    return Estimates(found.value[which], found.low[which], found.high[which])
 
 
 def centre(means: FloatArray, axis: TimeAxis) -> FloatArray:

@@ -1,7 +1,8 @@
 """The states that two agents came to, and what each of them expects there."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import closing
+from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
 from typing import Any
@@ -78,13 +79,13 @@ class Visits:
         Alike are two whose differences are closer to each other than half of the smaller one.
         """
         found: list[int] = []
-        for m in np.argsort(-self.apart, kind="stable"):
-            if len(found) == count or not self.apart[m]:
+        share = self.apart / (self.apart.max(initial=0.0) or 1.0)
+        share = np.round(share / _ROUNDING)  # so that rounding does not put them in order
+        for m in np.argsort(-share, kind="stable"):
+            if len(found) == count or not share[m]:
                 break
-            closest = (
-                np.abs(self.difference[found] - self.difference[m]).sum(axis=-1).min(initial=np.inf)
-            )
-            if closest > 0.5 * self.apart[m]:
+            others = np.abs(self.difference[found] - self.difference[m]).sum(axis=-1)
+            if (others > (0.5 + _ROUNDING) * self.apart[m]).all():
                 found.append(int(m))
         return found
 
@@ -133,27 +134,31 @@ def visit(
             different.add(told.digest())
     count = min(len(of.found) for of in kept)
     found = [item for of in kept for item in of.evenly(count)]
-    return replace(_visits(players, found, len(different)), cut=cut)
+    axis = players[0].estimator.time_axis.shared(players[1].estimator.time_axis)
+    components, probabilities = zip(
+        *(_decided(agent, i, found, axis) for i, agent in enumerate(players)), strict=True
+    )
+    return Visits(
+        time_axis=axis,
+        components=np.stack(components),
+        probabilities=np.stack(probabilities),
+        player=np.array([seen.player for seen in found]),
+        seed=np.array([seen.seed for seen in found]),
+        step=np.array([seen.step for seen in found]),
+        different=len(different),
+        cut=cut,
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """An observation, where it was made, and what the two would do there.
-
-    Args:
-        player: in whose episode.
-        seed: of that episode.
-        step: of that episode.
-        observation: `[...]`.
-        probabilities: of each of the two, `[1, A]`; None of an onlooker who acts greedily, whom one
-            can ask later.
-    """
+    """An observation, in whose episode it was made and where, and what the two would do there."""
 
     player: int
     seed: int
     step: int
     observation: NDArray[Any]
-    probabilities: tuple[FloatArray | None, FloatArray | None]
+    probabilities: tuple[FloatArray | None, ...]  # [1, A] each; None of who can be asked later
 
 
 class _Kept:
@@ -179,51 +184,28 @@ class _Kept:
 def _played(
     players: tuple[Agent, Agent], player: int, seed: int, max_steps: int | None
 ) -> Iterator[tuple[_Seen, bytes, bool]]:
-    """Plays one episode just as it is explained, so that each of its steps can be.
+    """Plays one episode of a player just as it is explained, so that each of its steps can be.
 
-    Each of the two is asked at every step, for either may remember what came before.
-
-    Args:
-        players: the two.
-        player: 0 or 1, who of them acts.
-        seed: of the episode.
-        max_steps: after which it is cut off.
+    The other one looks on, and is asked at every step if it may remember what came before.
 
     Yields:
         What was seen at each step, what was done and paid, and whether more could have come of an
         episode that is not played on.
     """
-    agent, other = players[player], players[1 - player].policy
-    environments, rng, memory = agent.make(1, seed), np.random.default_rng(seed), None
-    try:
-        policy = acting(agent.policy or agent.estimator)
+    agent, other, memory = players[player], players[1 - player].policy, None
+    with closing(agent.make(1, seed)) as environments:
+        policy, rng = acting(agent.policy or agent.estimator), np.random.default_rng(seed)
         playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
         while playing.running[0]:
             at, observation = playing.steps, np.array(playing.stack.observations)  # [1, ...]
             turn, likely = playing.turn(), None
             if other is not None:
                 likely, memory = ask(other, observation, memory, np.array([at == 0]))
-            told = (turn.probabilities, likely)  # [1, A] each
+            told = (turn.probabilities, likely)
             seen = _Seen(player, seed, at, observation[0], told if player == 0 else told[::-1])
             step = playing.take(turn.actions)
             is_cut = bool(playing.finished[0] and not step.ended[0])
             yield seen, turn.actions.tobytes() + step.rewards.tobytes(), is_cut
-    finally:
-        environments.close()
-
-
-def _visits(players: tuple[Agent, Agent], found: Sequence[_Seen], different: int) -> Visits:
-    axis = players[0].estimator.time_axis.shared(players[1].estimator.time_axis)
-    told = [_decided(agent, i, found, axis) for i, agent in enumerate(players)]
-    return Visits(
-        time_axis=axis,
-        components=np.stack([components for components, _ in told]),
-        probabilities=np.stack([probabilities for _, probabilities in told]),
-        player=np.array([seen.player for seen in found]),
-        seed=np.array([seen.seed for seen in found]),
-        step=np.array([seen.step for seen in found]),
-        different=different,
-    )
 
 
 def _decided(

@@ -110,13 +110,13 @@ def key_rows(played: Played, count: int, *told: range) -> list[int]:
 # ---- the beginning and the end -----------------------------------------------------------------
 
 
-@EPISODES.rule("At the start it expected no rewards.")
+@EPISODES.rule("At the start the agent expected no rewards.")
 def expected_nothing(played: Played) -> Iterator[Fields]:
     if not played.episode.expected[0].any():
         yield {}
 
 
-@EPISODES.rule("At the start it expected {value:rewards}.")
+@EPISODES.rule("At the start the agent expected {value:rewards}.")
 def expected_in_all(played: Played) -> Iterator[Fields]:
     """There is no explicit component."""
     row = played.episode.expected[0]  # [N+1]
@@ -124,7 +124,9 @@ def expected_in_all(played: Played) -> Iterator[Fields]:
         yield {"value": float(row.sum())}
 
 
-@EPISODES.rule("At the start it expected {value:rewards}, the largest part {component:when}.")
+@EPISODES.rule(
+    "At the start the agent expected {value:rewards}, the largest part {component:when}."
+)
 def expected_at_start(played: Played) -> Iterator[Fields]:
     row = played.episode.expected[0]  # [N+1]
     if len(row) > 1 and row.any():
@@ -157,14 +159,14 @@ def cut_off(played: Played) -> Iterator[Fields]:
         yield _length(played)
 
 
-@EPISODES.rule("Counted from the start it got {got:rewards}{scope:text}, as it had expected.")
+@EPISODES.rule("Seen from the start it got {got:rewards}{scope:text}, as it had expected.")
 def as_expected(played: Played) -> Iterator[Fields]:
     """The discounted reward up to the first end is what was expected then, but for rounding."""
     yield from (of for of in _outcome(played) if of["is_as_expected"])
 
 
 @EPISODES.rule(
-    "Counted from the start it got {got:rewards}{scope:text}; it had expected {expected:number}."
+    "Seen from the start it got {got:rewards}{scope:text}; it had expected {expected:number}."
 )
 def other_than_expected(played: Played) -> Iterator[Fields]:
     yield from (of for of in _outcome(played) if not of["is_as_expected"])

@@ -13,8 +13,8 @@ FOCUS = 1 / 3
 NEARLY = 1 / 4
 """The share of what moved from one step to another by which signs may be mixed there."""
 
-_TURNED = "At {step:step} {action} turned out {gap:number} {outcome:text} than expected"
-_ALIKE = "the total hardly changed."
+_TURNED = "{action} at {step:step} turned out {gap:number} {outcome:text} than expected"
+_ALIKE = "all together it expects about the same."
 _SAYS = {
     "turned-out": f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
     "ended-early": (  # the future ended, which changed more than the reward did
@@ -25,23 +25,24 @@ _SAYS = {
     ),
     "no-reward": f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
     "other-belief": (  # of a later component
-        f"{_TURNED}, mainly because what it expects {{component:when}} went from {{was:number}} to "
-        "{now:number}."
+        "After {action} at {step:step} it expected {gap:number} {much:text} than before, mainly "
+        "because what it expects {component:when} went from {was:number} to {now:number}."
     ),
     "spread-out": (  # half of what speaks for the outcome lies at a step or before
-        f"{_TURNED}, spread over many steps: half of it {{by:within}}."
+        "After {action} at {step:step} it expected {gap:number} {much:text} than before, spread "
+        "over many steps: half of it {by:within}."
     ),
     "put-off": (
-        "At {step:step} {action} put off {worth:rewards}, now expected {to:when}, not "
-        f"{{origin:when}}; {_ALIKE}"
+        "{action} at {step:step} delayed {worth:rewards}: they were to come {origin:when}, and now "
+        f"{{to:when}}; {_ALIKE}"
     ),
     "brought-forward": (
-        "At {step:step} {action} brought {worth:rewards} forward, now expected {to:when}, not "
-        f"{{origin:when}}; {_ALIKE}"
+        "{action} at {step:step} brought {worth:rewards} forward: they were to come {origin:when}, "
+        f"and now {{to:when}}; {_ALIKE}"
     ),
     "exchanged": (
-        "At {step:step} {action} gained {gain:number} {up:when} and lost {loss:number} "
-        f"{{down:when}}: {_ALIKE}"
+        "{action} at {step:step} gained {gain:number} {up:when} and lost {loss:number} "
+        f"{{down:when}}; {_ALIKE}"
     ),
 }
 """Of each kind of turn its sentence; each is one rule."""
@@ -85,6 +86,7 @@ def _turn(played: Played, row: int) -> tuple[str, Fields]:
     change = after - before
     total = float(change.sum())
     about |= {"gap": abs(total), "outcome": "better" if total > 0.0 else "worse"}
+    about |= {"much": "more" if total > 0.0 else "less"}
     directed = np.sign(total) * change  # what is above 0 speaks for the outcome
     if len(directed) == 1:
         return "turned-out", about

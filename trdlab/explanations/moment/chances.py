@@ -25,7 +25,8 @@ def outcomes_of(choice: Choice) -> Sequence[dict[float, float]]:
 
 
 @CHOICES.rule(
-    "It puts the chance that {action} pays {reward:number} {component:when} at {chance:percent}."
+    "The agent puts the chance that {action} pays {reward:number}, {component:when}, at "
+    "{chance:percent}."
 )
 def put_at(choice: Choice) -> Iterator[Fields]:
     """The chance that the largest component implies, where one reward or none is ever observed.
@@ -57,7 +58,7 @@ def give_or_take(choice: Choice) -> Iterator[Fields]:
             yield {"action": action, "value": value, "deviation": deviation}
 
 
-@CHOICES.rule("There is {chance:chance} that {action} {reward:pays} {component:when}.")
+@CHOICES.rule("There is {chance:chance} that {action} {reward:pays}, {component:when}.")
 def either_or(choice: Choice) -> Iterator[Fields]:
     """A step that pays one amount or nothing; of several, where most of it is expected.
 
@@ -81,15 +82,13 @@ def either_or(choice: Choice) -> Iterator[Fields]:
         yield {"action": choice.action, "reward": reward, "component": i, "chance": chance}
 
 
-@CHOICES.rule(
-    "After {action} the episode has ended {last_step:within} with {chance:percent} probability."
-)
+@CHOICES.rule("With {action}, there is {chance:chance} that the episode ends {last_step:within}.")
 def likely_over(choice: Choice) -> Iterator[Fields]:
     """The first component at whose beginning the episode has more likely ended than not."""
     yield from (over for over in _over(choice) if over["chance"] < 1.0)
 
 
-@CHOICES.rule("After {action} the episode is over {last_step:within}.")
+@CHOICES.rule("With {action}, the episode ends {last_step:within}.")
 def surely_over(choice: Choice) -> Iterator[Fields]:
     """It has ended for certain by the first component at which it has likely ended."""
     yield from (over for over in _over(choice) if over["chance"] == 1.0)

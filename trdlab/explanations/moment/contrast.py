@@ -10,7 +10,6 @@ from trdlab.explanations.moment.leads import (
     are_sure,
     better_of,
     crossings,
-    has_costs,
     is_by_discount,
     is_immediate,
     is_tied,
@@ -121,8 +120,8 @@ def better_against_total(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "{better} is worth {better_value:number} now and {worse} {worse_value:number}, with γ = "
-    "{gamma:given}."
+    "All steps counted, {better} is worth {better_value:number} and {worse} is worth "
+    "{worse_value:number} (γ = {gamma:given})."
 )
 def better(choice: Choice) -> Iterator[Fields]:
     yield from better_of(choice)
@@ -194,7 +193,7 @@ def untested_difference(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "What decides comes {component:when}: {better} {better_sum:pays} and {worse} "
+    "What comes {component:when} decides: {better} {better_sum:pays} then and {worse} "
     "{worse_sum:pays}{averages:averages}."
 )
 def decided_at(choice: Choice) -> Iterator[Fields]:
@@ -239,28 +238,29 @@ def costs_less(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "{last_step:within}{net:net} {leader} {leader_sum:pays} and {other} {other_sum:pays}"
+    "{last_step:within} {leader} {leader_sum:gains} and {other} {other_sum:gains}"
     "{averages:averages}."
 )
 def pays_more(choice: Choice) -> Iterator[Fields]:
     """Rewards do not come soon, or costs come with them."""
     for lead in leads_of(choice):
         if not is_immediate(choice, lead) and not are_costs(choice, lead):
-            yield lead | {"net": has_costs(choice, lead)}
+            yield lead
 
 
 @CHOICES.rule(
-    "{leader} overtakes {other} {component:when}: up to then {leader} {leader_sum:pays} and "
-    "{other} {other_sum:pays}{averages:averages}."
+    "After {count:first} {leader} has overtaken {other}: added up, it {leader_sum:gains} and "
+    "{other} {other_sum:gains}{averages:averages}."
 )
 def overtakes(choice: Choice) -> Iterator[Fields]:
     for leader, other, i in crossings(choice):
         if i < choice.time_axis.horizon:
-            yield sums(choice, leader, other, i + 1) | {"component": i}
+            count = (i + 1) * choice.time_axis.width
+            yield sums(choice, leader, other, i + 1) | {"component": i, "count": count}
 
 
 @CHOICES.rule(
-    "But what comes {component:when} decides: there {leader} pays {more:number} more than {other}"
+    "But what comes {component:when} decides: {leader} pays {more:number} more then than {other}"
     "{averages:averages}."
 )
 def makes_up(choice: Choice) -> Iterator[Fields]:
@@ -276,7 +276,9 @@ def makes_up(choice: Choice) -> Iterator[Fields]:
             }
 
 
-@CHOICES.rule("{leader} is never behind {other} in {count:next}, nor in the end.")
+@CHOICES.rule(
+    "Added up step by step, {leader} is never behind {other}: not in {count:first}, nor in the end."
+)
 def never_behind(choice: Choice) -> Iterator[Fields]:
     """Step by step its running total is no smaller, and larger in the end; w = 1."""
     axis = choice.time_axis
@@ -308,8 +310,8 @@ def _is_sufficient(
 
 
 @CHOICES.rule(
-    "What comes {components:whens} is enough to prefer {better}: {advantage:number} more there, "
-    "against {disadvantage:number} for {worse} elsewhere.",
+    "What comes {components:whens} is enough to make {better} better: it is {advantage:number} "
+    "ahead then, and {disadvantage:number} behind otherwise.",
     holds=_is_sufficient,
 )
 def reasons(choice: Choice) -> Iterator[Fields]:

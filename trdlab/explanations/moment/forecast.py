@@ -62,12 +62,13 @@ def zero_on_average(choice: Choice) -> Iterator[Fields]:
         yield {"action": choice.action}
 
 
-@CHOICES.rule("All that {action} pays comes {component:when}: it is worth {value:number} now.")
+@CHOICES.rule("{action} pays nothing {last_step:within}; what comes later is worth {value:number}.")
 def all_beyond(choice: Choice) -> Iterator[Fields]:
     row, horizon = _row(choice), choice.time_axis.horizon
     is_told = horizon > 0 and speaks_of_all(choice.moment, choice.action)
     if is_told and not row[:-1].any() and row[-1] != 0.0:
-        yield {"action": choice.action, "component": horizon, "value": float(row[-1])}
+        last_step = choice.time_axis.num_steps - 1
+        yield {"action": choice.action, "last_step": last_step, "value": float(row[-1])}
 
 
 @CHOICES.rule("Nothing is expected of {action} {last_step:within}.")
@@ -89,15 +90,16 @@ def next_to_nothing(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "After {action} the first {effect:text} comes {component:when}: {worth:worth}{amount:number}."
+    "With {action}, the first {effect:text} comes {component:when}: it is {worth:worth}"
+    "{amount:number}."
 )
 def first_reward(choice: Choice) -> Iterator[Fields]:
     yield from (told for told in _firsts(choice) if told["is_sure"])
 
 
 @CHOICES.rule(
-    "After {action} the first {effect:text} can come {component:when}: {amount:number}, with "
-    "{chance:chance}."
+    "With {action}, a {effect:text} of {amount:number} can come {component:when}{earliest:text}; "
+    "the chance that it comes then is {chance:percent}."
 )
 def first_chance(choice: Choice) -> Iterator[Fields]:
     """That step pays, or costs, one amount or none."""
@@ -107,7 +109,8 @@ def first_chance(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "After {action} the first {effect:text} can come {component:when}, with {chance:chance}."
+    "With {action}, a {effect:text} can come {component:when}{earliest:text}; the chance that it "
+    "comes then is {chance:percent}."
 )
 def first_of_several(choice: Choice) -> Iterator[Fields]:
     """That step pays, or costs, different amounts."""
@@ -115,7 +118,7 @@ def first_of_several(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "After {action} the first {effect:text} is expected {component:when}: {worth:worth}"
+    "With {action}, the first {effect:text} to expect comes {component:when}: {worth:worth}"
     "{amount:number} on average."
 )
 def first_expected(choice: Choice) -> Iterator[Fields]:
@@ -154,7 +157,7 @@ def share_beyond(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "What {action} {pays:text} {last_step:within} comes {step:tenths} steps from now on average."
+    "What {action} {pays:text} {last_step:within} comes {step:tenths} steps later on average."
 )
 def centre_of_mass(choice: Choice) -> Iterator[Fields]:
     """The mean step of several rewards of one sign, weighted by what they are worth now; w = 1."""
@@ -215,6 +218,7 @@ def _firsts(choice: Choice) -> Iterator[Fields]:
             "action": action,
             "effect": effect,
             "component": i,
+            "earliest": " at the earliest" if i else "",
             "worth": axis.width > 1,
             "amount": mean,
             "amounts": tuple(sorted(chances)),

@@ -39,7 +39,7 @@ def regular(choice: Choice, named: Collection[int] = ()) -> list[Claim]:
     return (every(choice, rhythm) or single) + every(choice, spread)
 
 
-@CHOICES.rule("Each of {count:next} {mean:pays} after {action}{average:average}.")
+@CHOICES.rule("With {action}, each of {count:first} {mean:pays}{average:average}.")
 def steady(choice: Choice) -> Iterator[Fields]:
     """Each of three or more steps is within `ALIKE` of their mean; w = 1."""
     row = undiscounted(choice.moment, choice.action)
@@ -53,8 +53,8 @@ def steady(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "The largest {effect:text} after {action} {last_step:within} comes {component:when}: it is "
-    "worth {discounted:number} now."
+    "The largest {effect:text} of {action} {last_step:within} comes {component:when}: it is worth "
+    "{discounted:number}."
 )
 def peak(choice: Choice) -> Iterator[Fields]:
     """The largest of several components, without their discount; of what was learned, a peak."""
@@ -69,9 +69,7 @@ def peak(choice: Choice) -> Iterator[Fields]:
         yield _about(choice) | {"effect": effect_of(value), "component": i, "discounted": value}
 
 
-@CHOICES.rule(
-    "{last_step:within} the {effect:text} expected after {action} peaks {components:whens}."
-)
+@CHOICES.rule("{last_step:within} the {effect:text} expected of {action} peaks {components:whens}.")
 def several_peaks(choice: Choice) -> Iterator[Fields]:
     """The most prominent of several peaks."""
     found = peaks(choice.moment, choice.action)
@@ -80,8 +78,8 @@ def several_peaks(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "{last_step:within} the {effect:text} expected after {action} peaks every {period:text} steps, "
-    "first {first:when} and last {last:when}."
+    "{last_step:within} the {effect:text} expected of {action} peaks every {period:text} steps, "
+    "the first time {first:when}, the last time {last:when}."
 )
 def rhythm(choice: Choice) -> Iterator[Fields]:
     """Three or more peaks whose spacings are nearly equal: each is within `UNEVEN` of their mean.
@@ -104,8 +102,8 @@ def rhythm(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "The {effect:text} expected after {action} {component:when} is spread over {steps:steps}: "
-    "either its time is uncertain, or it comes bit by bit."
+    "The {effect:text} that {action} is to bring {component:when} is spread over {steps:steps}: "
+    "its time is uncertain, or it comes bit by bit."
 )
 def spread(choice: Choice) -> Iterator[Fields]:
     """The highest peak of what was learned is wider than a step, at half its prominence; w = 1."""

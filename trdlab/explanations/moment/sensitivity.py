@@ -157,31 +157,33 @@ def flips(choice: Choice) -> Iterator[Fields]:
                 yield {"better": better, "worse": worse} | _bounds(of, side, (side[0] + end) / 2)
 
 
-@CHOICES.rule("No searched value of {quantity:text} makes {worse} better than {better}.")
+@CHOICES.rule("No value that was tried for {quantity:text} makes {worse} better than {better}.")
 def never_flips(choice: Choice) -> Iterator[Fields]:
     for of, better, worse, roots in _found(choice):
         if not roots:
             yield {"quantity": of.name, "worse": worse, "better": better}
 
 
-@CHOICES.rule("In all, the preference changes where {quantity:text} {is:text} {at:roots}.")
+@CHOICES.rule("In all, the preference changes at these values of {quantity:text}: {at:roots}.")
 def several_flips(choice: Choice) -> Iterator[Fields]:
     """Where there are more flips of one quantity than the nearest."""
     for of, _, _, roots in _found(choice):
         if len(roots) > 1:
             at = tuple(abs(root) for root in roots)
-            yield {"quantity": of.name, "is": of.verb("is", "pays", "costs"), "at": at}
+            yield {"quantity": of.name, "at": at}
 
 
 @CHOICES.rule(
-    "Searched were {samples:count} values each, with the best policy for each: {ranges:names}."
+    "{samples:count} values{of:text} were tried, every one with its own best policy: "
+    "{ranges:names}."
 )
 def searched(choice: Choice) -> Iterator[Fields]:
     """Two changes between two neighbouring values can be missed."""
     found = [of for of, *_ in _found(choice)]
     if found:
         ranges = tuple(f"{of.name} from {plain(of.low)} to {plain(of.high)}" for of in found)
-        yield {"samples": SAMPLES + 1, "ranges": ranges}
+        each = " of each" if len(ranges) > 1 else ""
+        yield {"samples": SAMPLES + 1, "of": each, "ranges": ranges}
 
 
 def _change(found: tuple[WhatIf, str, str, tuple[float, ...]]) -> tuple[bool, float]:

@@ -10,7 +10,7 @@ from trdlab.explanations.sections import Section, at_first
 
 def sections(choice: Choice) -> tuple[Section, ...]:
     """Returns all that is told of a choice, by the question that it answers."""
-    context = every(choice, tied_actions, tied_later, decided_by, counted_as, ended_by)
+    context = every(choice, tied_actions, tied_later, decided_by, signs_count, ended_by)
     if choice.moment.is_over:
         return (Section("forecast", "Here", tuple(every(choice, episode_is_over))),)
     parts = (
@@ -42,7 +42,7 @@ def _why(choice: Choice) -> str:
     return (
         f"Why {choice.action}, not {choice.foil}"
         if is_chosen
-        else f"{choice.action} or {choice.foil}"
+        else f"How {choice.action} differs from {choice.foil}"
     )
 
 
@@ -58,14 +58,19 @@ def episode_is_over(choice: Choice) -> Iterator[Fields]:
         yield {}
 
 
-@CHOICES.rule("All other actions stay here, or most likely do, so there is nothing to compare.")
+@CHOICES.rule(
+    "Every other action leaves things as they are, or most likely does, so nothing is compared."
+)
 def no_alternative(choice: Choice) -> Iterator[Fields]:
     names, stays = choice.moment.action_names, choice.moment.stays
     if choice.foil is None and stays is not None and len(names) > 1:
         yield {"others": tuple(name for name in names if name != choice.action)}
 
 
-@CHOICES.rule("{actions:names} are equally good here, but pay differently; the agent {takes:text}.")
+@CHOICES.rule(
+    "{actions:names} are equally good here, but pay other amounts or at other times; the agent "
+    "{takes:text}."
+)
 def tied_actions(choice: Choice) -> Iterator[Fields]:
     if choice.moment.tied:
         is_mixed = "mixes" in choice.moment.future.policy
@@ -87,11 +92,12 @@ def decided_by(choice: Choice) -> Iterator[Fields]:
     yield {"policy": choice.moment.future.policy}
 
 
-@CHOICES.rule("It counts the {reward:text}.")
-def counted_as(choice: Choice) -> Iterator[Fields]:
-    yield {"reward": choice.moment.future.reward}
+@CHOICES.rule("Of each reward only the sign counts.")
+def signs_count(choice: Choice) -> Iterator[Fields]:
+    if choice.moment.future.clip_rewards:
+        yield {}
 
 
-@CHOICES.rule("It looks ahead to {ending:text}.")
+@CHOICES.rule("All steps count, up to {ending:text}.")
 def ended_by(choice: Choice) -> Iterator[Fields]:
     yield {"ending": choice.moment.future.ending}

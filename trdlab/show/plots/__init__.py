@@ -5,9 +5,7 @@ from typing import TYPE_CHECKING
 from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
-    from trdlab.show.plots.figures import figure
-    from trdlab.show.plots.style import save
-
-__all__ = ["figure", "save"]
-
-__getattr__ = lazily(__name__, {"figure": "figures", "save": "style"})
+    from trdlab.show.plots.figures import figure as figure
+    from trdlab.show.plots.style import save as save
+else:
+    __getattr__ = lazily(__name__, {"figures": "figure", "style": "save"})

@@ -21,8 +21,7 @@ _WIDTH = 0.38  # of a bar
 @style.settings()
 def comparison_figure(comparison: Comparison) -> Figure:
     """Returns the means of both agents with intervals, and below them their difference."""
-    names = [f"{side}: {name}" for side, name in zip(SIDES, comparison.names, strict=True)]
-    figure = style.new_figure(6.2, " against ".join(names))
+    figure = style.new_figure(6.2, " against ".join(comparison.titles))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     plot_means(above, comparison).tick_params(labelbottom=False)
     plot_difference(below, comparison).set_xlabel(style.STEPS)

@@ -48,7 +48,7 @@ def test_futures_are_read_back_from_their_words():
     lives = Future("p", clip_rewards=True, life_loss_ends=True)
     assert Future.from_dict(lives.to_dict()) == lives
     with pytest.raises(InputError, match="No future counts the 'euros'"):
-        Future.from_dict({"policy": "p", "reward": "euros", "ending": "terminal states"})
+        Future.from_dict({"policy": "p", "reward": "euros", "ending": "the end of the episode"})
 
 
 def test_words_in_place_of_what_they_say_are_refused():

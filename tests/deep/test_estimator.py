@@ -6,12 +6,14 @@ import pytest
 import torch
 from gymnasium.vector import SyncVectorEnv
 
+from moments import told
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.estimator import NetworkEstimator
 from trdlab.deep.networks import build_network
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
-from trdlab.explanations import explain, moment_of
+from trdlab.explanations import check, moment_of
+from trdlab.explanations.moment.moment import CHOICES
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.wrappers import TemporalRewardDecomposition, VectorTemporalRewardDecomposition
 
@@ -104,9 +106,9 @@ def test_in_the_wrappers():
 def test_in_explanations():
     env = GridworldEnv("drone")
     moment = moment_of(estimator_for(env.observation_space), env.mdp.start, env.action_names)
-    explanation = explain(moment)
-    assert explanation.findings
-    assert all(finding.holds(moment) for finding in explanation.findings)
+    choice = moment.choice()
+    said = [claim.sentence for claim in told(choice)]
+    assert len(check(" ".join(said), [(CHOICES, choice)])) == len(said) > 0
     assert moment.future == FUTURE
 
 

@@ -1,73 +1,108 @@
-"""An explained agent, as text, as plain data, and drawn."""
+"""An explained agent: its sentences in their sections, as plain data, and drawn."""
 
 import json
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from trdlab.explanations.explained import Explained, Part, parse_parts
-from trdlab.explanations.moment.sentences import UnsupportedSentenceError
-from trdlab.show.explained import check_explained, summary, to_dict
 
 from trdlab.agents import gridworld_agent
-from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
-from trdlab.estimator import Future
-from trdlab.explanations import Moment, assess, explain, explain_agent
-from trdlab.show.plots.explained import (
-    moment_figure,
-    part_figure,
-    picture_paths,
-    trust_figure,
-)
+from trdlab.explanations import assess, explain
+from trdlab.explanations.calibration.claims import REPORTS
+from trdlab.explanations.episode.played import EPISODES
+from trdlab.explanations.explanation import Explanation, Part, parse_parts
+from trdlab.explanations.moment.moment import CHOICES
+from trdlab.explanations.moment.outcome import TRIALS
+from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check
+from trdlab.show.plots.calibration import trust_figure
+from trdlab.show.plots.figures import part_figure, picture_paths
 
 
 @cache
-def explained(name: str = "ledge", parts: tuple[Part, ...] = (), step: int = 0) -> Explained:
+def explained(name: str = "ledge", parts: tuple[Part, ...] = (), step: int = 0) -> Explanation:
     agent = gridworld_agent(name, TimeAxis(0.95, 4))
-    return explain_agent(agent, parts, step=step, episodes=100)
+    return explain(agent, parts, step=step, episodes=100)
 
 
-@pytest.mark.parametrize("name", ["drone", "ledge", "loop"])
-def test_every_sentence_of_a_summary_is_supported(name):
+def read(text: str, of: Explanation) -> list[Claim]:
+    """Reads sentences back, each against what it can speak of."""
+    played = None if of.story is None else of.story.played
+    known = ((CHOICES, of.choice), (REPORTS, of.report), (TRIALS, of.trial), (EPISODES, played))
+    return check(text, [(language, about) for language, about in known if about is not None])
+
+
+@pytest.mark.parametrize("name", ["drone", "ledge", "loop", "bridge", "tie"])
+def test_every_sentence_is_supported_and_the_answer_is_five_of_them_at_most(name):
     found = explained(name)
-    sections = summary(found)
-    texts = [text for section in sections for text in section.sentences]
-    assert found.explanation is not None
-    assert found.report is not None
-    assert len(check_explained(" ".join(texts), found)) == len(texts)
+    told = [sentence for section in found.sections for sentence in section.sentences]
+    assert [claim.sentence for claim in read(" ".join(told), found)] == told
+    answer = [claim.sentence for claim in found.answer]
+    assert 3 <= len(answer) <= 5
+    assert len(read(" ".join(answer), found)) == len(answer)
     with pytest.raises(UnsupportedSentenceError, match="no statement"):
-        check_explained("Trust me.", found)
-    assert 4 <= len(texts) <= 10
+        read("Trust me.", found)
 
 
-def test_a_summary_answers_what_why_not_how_far_and_whose():
-    told = {section.heading: " ".join(section.sentences) for section in summary(explained("drone"))}
-    assert list(told) == ["What down promises", "Why not up", "How far to trust it", "Whose future"]
-    what, why_not, how_far, whose = told.values()
-    assert "first reward to be expected of down is that of t+1: 1 on average" in what
-    assert "with γ = 0.95 down is worth 3.52 and up 3.26." in why_not
-    assert "Down gives more immediate rewards than up" in why_not
-    assert "As forecast, down paid more than up in all" in why_not
-    assert how_far.startswith("The forecast can be trusted ")
-    assert whose.startswith("After the first action it is the future of the optimal policy")
+def test_the_sections_answer_why_what_whose_and_how_far():
+    told = {part.heading: " ".join(part.sentences) for part in explained("drone").sections}
+    assert list(told) == [
+        "Why down, not up",
+        "What would change that",
+        "What to expect of down",
+        "Whose future",
+        "Tried out",
+        "The episode with seed 0",
+        "How it does",
+        "How far to trust it",
+        "What comes later than it tells",
+        "Other actions",
+        "What this rests on",
+    ]
+    assert told["Why down, not up"].startswith(
+        "Down gives more immediate rewards: 2.71 within 4 steps, where up gives nothing."
+    )
+    assert "down is worth 3.52, up 3.26." in told["Why down, not up"]
+    assert told["What to expect of down"].startswith("After down the first reward comes in 1 step")
+    assert told["Whose future"].startswith("After the first action, the optimal policy acts.")
+    assert told["Tried out"].startswith("As forecast, down was worth 0.266 more than up.")
+    assert told["How far to trust it"].startswith("Its forecasts are better than a guess about")
+
+
+def test_the_answer_begins_with_how_the_agent_does():
+    assert [claim.kind for claim in explained("drone").answer] == [
+        "scored-once",
+        "more-immediate",
+        "better-by-discount",
+        "came-exactly",
+        "better",
+    ]
+
+
+def test_only_what_is_asked_for_is_told():
+    found = explained(parts=("contrast", "calibration"), step=1)
+    names = [section.name for section in found.sections]
+    assert names == ["contrast", "flips", "context", "trial", "score", "trust", "later", "others",
+                     "judged"]  # fmt: skip
+    agent = gridworld_agent("drone", TimeAxis(0.95, 4))
+    forecast = explain(agent, ("forecast",), episodes=0)
+    assert [section.name for section in forecast.sections] == ["forecast", "context"]
 
 
 def test_the_plain_data_has_the_numbers_and_their_sentences():
     found = explained(parts=("contrast", "calibration"), step=1)
-    data = json.loads(json.dumps(to_dict(found), allow_nan=False))
-    assert data["schema"] == "trdlab.explanations/1"
+    data = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert data["schema"] == "trdlab.explain/2"
     assert data["time_axis"]["labels"] == ["t", "t+1", "t+2", "t+3", "t+4…∞"]
+    assert (data["seed"], data["step"]) == (0, 1)
     moment, calibration = data["moment"], data["calibration"]
-    assert (moment["seed"], moment["step"]) == (0, 1)
     for action in moment["actions"].values():
         assert sum(action["components"]) == pytest.approx(action["q_value"])
-    kinds = [finding["kind"] for finding in moment["findings"]]
-    assert "better" in kinds
-    assert "first-step-cost" not in kinds  # that is of the forecast
-    assert calibration["schema"] == "trdlab.trust/1"
-    assert calibration["episodes"] == 100
+    assert found.choice is not None
+    assert (moment["action"], moment["foil"]) == (found.choice.action, found.choice.foil)
+    assert calibration["schema"] == "trdlab.trust/2"
+    assert calibration["judged"]["episodes"] == 100
     assert found.report is not None
     np.testing.assert_array_equal(
         np.array(calibration["calibration"]["skill"]["low"], dtype=float),
@@ -75,51 +110,20 @@ def test_the_plain_data_has_the_numbers_and_their_sentences():
     )
     assert len(calibration["ceiling"]["skill"]["value"]) == 5
     assert calibration["trusted"]["last_step"] == found.report.trust.last_step
-    text = " ".join(finding["sentence"] for finding in calibration["findings"])
-    assert len(check_explained(text, found)) == len(calibration["findings"])
+    told = [finding["sentence"] for part in data["sections"] for finding in part["findings"]]
+    assert [claim.sentence for claim in read(" ".join(told), found)] == told
+    assert [finding["sentence"] for finding in data["answer"]] == [
+        claim.sentence for claim in found.answer
+    ]
 
 
 def test_what_was_not_asked_for_is_null():
     agent = gridworld_agent("drone", TimeAxis(0.95, 4))
-    forecast = to_dict(explain_agent(agent, ("forecast",), episodes=0))
-    assert forecast["calibration"] is None
-    kinds = {finding["kind"] for finding in forecast["moment"]["findings"]}
-    assert "first-step-reward" in kinds
-    assert not {"better", "better-by-discount", "not-trusted-at"} & kinds
-    assert to_dict(explained(parts=("calibration",)))["moment"] is None
-
-
-def test_bars_that_are_not_to_be_trusted_are_faded():
-    found = explained("ledge")
-    explanation, report = found.explanation, found.report
-    assert explanation is not None
-    assert report is not None
-    trust = replace(report.trust, components=2, tested=2, residual=True)
-    of_foils = replace(report.trust, components=3, tested=3, residual=False)
-    moment = replace(explanation.moment, trust=trust, foil_trust=of_foils)
-    figure = moment_figure(replace(explanation, moment=moment), explanation.foil, "ledge")
-    figure.canvas.draw()
-    faded = [
-        [bar.get_alpha() is not None for bar in ax.patches] for ax in figure.axes if ax.patches
-    ]
-    assert faded[0] == [False, False, True, True, False]
-    assert faded[1] == [False, False, False, True, True]
-    assert faded[2] == [False, False, True, True, True], "a difference needs both"
-    assert "faded" in figure.texts[-1].get_text()
-
-
-def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
-    rows = np.array([[1.0, 0.9, 94.5], [1.0, -0.8, 2.0]])
-    axis = TimeAxis(0.95, 2)
-    moment = Moment(RewardDecomposition(rows, axis), ("left", "right"), Future("a policy"))
-    figure = moment_figure(explain(moment, "left", "right"), "right", "")
-    action, foil, contrast = figure.axes
-    assert action.get_ylim() == foil.get_ylim() == (-1.5, 1.5)
-    notes = [[text.get_text() for text in ax.texts] for ax in figure.axes]
-    assert notes[0][-1] == "↑ 94.5"
-    assert notes[1][-1] == "↑ 2"
-    assert notes[2][-1] == "↑ 92.5"
-    assert contrast.get_ylim()[1] < 3.0
+    forecast = explain(agent, ("forecast",), episodes=0).to_dict()
+    nothing = ("calibration", "trial", "episode")
+    assert {name: forecast[name] for name in nothing} == dict.fromkeys(nothing)
+    calibration = explained(parts=("calibration",)).to_dict()
+    assert calibration["moment"] is calibration["trial"] is calibration["episode"] is None
 
 
 def test_how_often_a_reward_came_is_drawn_where_there_is_one_amount():
@@ -129,7 +133,7 @@ def test_how_often_a_reward_came_is_drawn_where_there_is_one_amount():
     coin = assess(gridworld_agent("loop,slip=0.2", TimeAxis(0.95, 4)), episodes=120)
     skill, chance = trust_figure(coin, "loop").axes
     assert skill.get_ylabel().startswith("skill")
-    assert chance.get_title() == "chance of the reward of 1"
+    assert chance.get_title() == "the reward of 1"
     drawn = np.asarray(chance.collections[-1].get_offsets())
     found = coin.calibration.reliability
     assert found is not None
@@ -143,6 +147,7 @@ def test_there_is_a_picture_only_of_what_there_is():
     assert part_figure(found, "forecast") is None
     assert part_figure(found, "contrast") is None
     assert part_figure(found, "calibration") is not None
+    assert found.plot().get_suptitle() == part_figure(found, "calibration").get_suptitle()
 
 
 def test_pictures_are_named_by_what_they_show(tmp_path):

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.wrappers import FrameStackObservation
-from trdlab.explanations.moment.sentences import check, sentences
 
 import trdlab
+from moments import told as told_of
 from trdlab.cli import main
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
@@ -22,7 +22,9 @@ from trdlab.environments import Environments, NotParallel
 from trdlab.environments.interface import Interface
 from trdlab.errors import InputError, NotImported
 from trdlab.estimator import Estimator, Future
-from trdlab.explanations import explain, moment_of
+from trdlab.explanations import check, moment_of
+from trdlab.explanations.moment.moment import CHOICES
+from trdlab.explanations.moment.telling import sections
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.runs import RunFolder, load_checkpoint
 from trdlab.training.loading import evaluate_run, load
@@ -114,19 +116,17 @@ def test_in_explanations(tmp_path, lines, future):
     for state in (0, 1, 5):
         moment = moment_of(estimator, state, env.action_names)
         assert moment.future == future
-        explanation = explain(moment)
-        assert explanation.contrast
-        assert explanation.forecast
-        assert all(finding.holds(moment) for finding in explanation.findings)
-        told = sentences(explanation)
-        for sentence, finding in zip(told, explanation.findings, strict=True):
-            assert [type(of) for of in check(sentence, explanation)] == [type(finding)]
-        best = env.action_names[int(moment.q_values.argmax())]
-        assert explanation.action == best
-        assert told[-1] == (
-            f"After the first action it is the future of {future.policy}; it counts the "
-            f"{future.reward} and ends at {future.ending}."
-        )
+        choice = moment.choice()
+        assert {section.name for section in sections(choice)} >= {"contrast", "forecast"}
+        told = told_of(choice)
+        for claim in told:
+            assert [of.kind for of in check(claim.sentence, [(CHOICES, choice)])] == [claim.kind]
+        assert choice.action == env.action_names[int(moment.q_values.argmax())]
+        assert [claim.sentence for claim in told[-3:]] == [
+            f"After the first action, {future.policy} acts.",
+            f"It counts the {future.reward}.",
+            f"It looks ahead to {future.ending}.",
+        ]
 
 
 # ---- evaluated -----------------------------------------------------------------------------------

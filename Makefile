@@ -25,7 +25,8 @@ unit: $(VENV)/installed-tests
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2  # one thread for each worker
 
 docs: $(VENV)/installed-tests
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo 'Open site/index.html in a browser.'
 
 # With the lowest versions that we declare, and then with the lowest Gymnasium that has Atari games.
 # They have wheels for Python 3.11 and 3.12.
@@ -40,7 +41,7 @@ bench: $(VENV)/installed
 	$(BIN)/python benchmarks/startup.py
 
 clean:
-	rm -rf $(VENV) $(VENV)-lowest site
+	rm -rf $(VENV) $(VENV)-lowest .cache site
 
 $(VENV)/python: constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "trdlab needs Python 3.11 or newer; try: make PYTHON=python3.12 $(MAKECMDGOALS)")'

@@ -3,7 +3,16 @@
 import re
 from typing import Any
 
-from griffe import ExprCall, Extension, Function, Object
+from griffe import (
+    Class,
+    ExprCall,
+    Extension,
+    Function,
+    Object,
+    Parameter,
+    ParameterKind,
+    Parameters,
+)
 
 _EXAMPLE = re.compile(r"^>>> .*?(?=\n[ \t]*\n|\Z)", re.DOTALL | re.MULTILINE)
 _ERRATA = re.compile(r"\(errata [^)]*\)")
@@ -11,10 +20,11 @@ _ROW = re.compile(r"\b([PC]\d+)\b")
 
 
 class Docstrings(Extension):
-    """Fences the examples of a docstring as code, and links the rows of the errata it names.
+    """Prepares what docstrings and signatures say.
 
-    Of a setting's default, help and so on (`_option` in `trdlab.deep.settings`) only the default is
-    left: signatures are shown with it.
+    Examples are fenced as code, and the rows of the errata are linked. A named tuple gets the
+    signature that it is made with, as data classes do. Of a setting's default, help and so on
+    (`_option` in `trdlab.deep.settings`) only the default is left: signatures are shown with it.
     """
 
     def on_object(self, *, obj: Object, **_: Any) -> None:
@@ -26,16 +36,29 @@ class Docstrings(Extension):
             if isinstance(default, ExprCall) and str(default.function) == "_option":
                 parameter.default = default.arguments[0]
 
+    def on_class_members(self, *, cls: Class, **_: Any) -> None:
+        """Gives a named tuple its signature."""
+        if "NamedTuple" in map(str, cls.bases) and "__init__" not in cls.members:
+            fields = [one for one in cls.attributes.values() if one.annotation is not None]
+            kind = ParameterKind.positional_or_keyword
+            parameters = [
+                Parameter(one.name, annotation=one.annotation, kind=kind, default=one.value)
+                for one in fields
+            ]
+            itself = Parameter("self", kind=kind)
+            init = Function("__init__", parameters=Parameters(itself, *parameters), returns="None")
+            cls.set_member("__init__", init)
+
 
 def prepared(docstring: str) -> str:
     """Returns a docstring in the Markdown that the pages need.
 
     >>> prepared("Counts from 0 (errata P8).")
-    'Counts from 0 (errata [P8](../errata.md#p8)).'
+    'Counts from 0 (errata [P8][p8]).'
     """
     fenced = _EXAMPLE.sub(lambda example: f"```pycon\n{example[0]}\n```", docstring)
     return _ERRATA.sub(lambda found: _ROW.sub(_link, found[0]), fenced)
 
 
 def _link(row: re.Match[str]) -> str:
-    return f"[{row[0]}](../errata.md#{row[0].lower()})"
+    return f"[{row[0]}][{row[0].lower()}]"  # a heading of errata.md, from any page

@@ -1,57 +1,94 @@
-"""Runs the lessons while MkDocs builds the site, and turns each one into a page.
+"""What MkDocs does beside turning Markdown into pages: lessons, commands, and the reference.
 
-A lesson is a script in `tutorials/`, cut into cells by `# %%` (code) and `# %% [markdown]` (prose
-in comments). Its page shows prose, code, what the code printed, the value of a cell's last
-expression, and the figures it drew. Pages and pictures are generated files of the build; nothing
-is written into the work tree. An error in a lesson fails the build and names its line.
+The lessons of `tutorials/` are run, each in a process of its own, and become pages; so do the
+commands on the pages. Neither is run again before its sources change: the results are kept in
+`.cache/docs/`. Nothing else is written into the work tree.
 """
 
-import ast
-import io
+import logging
 import os
 import re
+import subprocess
 import sys
-import traceback
-from collections.abc import Iterator
-from contextlib import redirect_stdout
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
 from typing import Any
 
+import markdown_exec
+from catalogue import expanded
+from kept import Files, fingerprint, made
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.livereload import LiveReloadServer
-from mkdocs.structure.files import File, Files
+from mkdocs.structure import files as structure
 from mkdocs.structure.pages import Page
 
-_MARKER = re.compile(r"^# %%(?P<prose>.*\[markdown\])?.*$")
+DOCS = Path(__file__).parent
 _FROM_THE_NETWORK = re.compile(
     r'<(?:script|img|iframe)[^>]* src="https?:[^"]*|<link[^>]* href="https?:[^"]*'
 )
+_PLAIN = {"NO_COLOR": "1", "COLUMNS": "80", "MPLBACKEND": "agg"}
+_ROOT_OF_A_SERVER = (
+    "<script>if (location.protocol !== 'file:') document.write('<base href=\"/\">')</script>"
+)
+_SLOW = 2.0
+"""Seconds after which it is told what took them."""
 
-
-@dataclass(frozen=True)
-class Cell:
-    """A piece of a lesson: prose or code, and the line of the script on which it begins."""
-
-    text: str
-    line: int
-    is_prose: bool
-
-
-@dataclass(frozen=True)
-class Output:
-    """What a code cell leaves behind: printed text, a last value as HTML, pictures as SVG."""
-
-    text: str = ""
-    html: str = ""
-    figures: tuple[bytes, ...] = ()
+_log = logging.getLogger("mkdocs.hooks.trdlab")
 
 
 def on_startup(**_: Any) -> None:
     """Lets pages run the `trdlab` of this environment, printing plain text of one width."""
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    os.environ |= {"NO_COLOR": "1", "COLUMNS": "80", "MPLBACKEND": "agg"}
+    os.environ |= _PLAIN
+
+
+def on_config(config: MkDocsConfig) -> None:
+    """Takes the place of the plugin that runs commands, and keeps what they print."""
+    cache = _cache(config)
+
+    def run(code: str, returncode: int = 0, **_: Any) -> str:
+        return command_output(code, returncode, cache)
+
+    def bash(**options: Any) -> str:
+        return markdown_exec.base_format(language="bash", run=run, **options)
+
+    markdown_exec.formatters["bash"] = bash
+
+
+def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
+    """Adds a page for each lesson, its pictures, and the scripts themselves to download."""
+    scripts = sorted(_tutorials(config).glob("*.py"))
+    lessons = [script for script in scripts if script.name[0].isdigit()]
+    for script in scripts:
+        uri = f"lessons/{script.name}"
+        files.append(structure.File.generated(config, uri, abs_src_path=str(script)))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # the first that fails ends it
+        pages = list(pool.map(lambda script: lesson(script, _cache(config)), lessons))
+    for script, made_of_it in zip(lessons, pages, strict=True):
+        for name, content in made_of_it.items():
+            uri = f"lessons/{script.stem}.md" if name == "page.md" else f"lessons/{name}"
+            files.append(structure.File.generated(config, uri, content=content))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
+    """Fills in the lists of a page, and notes when the work on it begins."""
+    page.meta["begun"] = perf_counter()
+    try:
+        return expanded(markdown, _package().parent)
+    except LookupError as error:
+        raise PluginError(f"{page.file.src_uri}: {error}") from error
+
+
+def on_page_content(html: str, page: Page, **_: Any) -> None:
+    """Tells of a page that took long."""
+    if (seconds := perf_counter() - page.meta["begun"]) > _SLOW:
+        _log.info("Page %s: %.0f s", page.file.src_uri, seconds)
 
 
 def on_post_page(output: str, page: Page, **_: Any) -> str:
@@ -61,131 +98,94 @@ def on_post_page(output: str, page: Page, **_: Any) -> str:
     return output
 
 
-def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Adds a page for each lesson, its pictures, and the scripts themselves to download."""
-    for script in sorted(_tutorials(config).glob("*.py")):
-        uri = f"lessons/{script.name}"
-        files.append(File.generated(config, uri, abs_src_path=str(script)))
-        if script.name[0].isdigit():
-            page, pictures = lesson_page(script)
-            for name, picture in pictures.items():
-                files.append(File.generated(config, f"lessons/{name}", content=picture))
-            files.append(File.generated(config, f"lessons/{script.stem}.md", content=page))
-    return files
+def on_post_template(output_content: str, template_name: str, **_: Any) -> str:
+    """Lets the page for missing pages find its files on disk, too, where there is no root."""
+    if template_name != "404.html":
+        return output_content
+    relative = re.sub(r'((?:href=|src=|"base": )")/', r"\1", output_content)
+    return relative.replace("<head>", f"<head>{_ROOT_OF_A_SERVER}", 1)
 
 
 def on_serve(server: LiveReloadServer, config: MkDocsConfig, **_: Any) -> None:
-    """Rebuilds when a lesson changes; for changes in trdlab itself, start `mkdocs serve` anew."""
+    """Rebuilds when a lesson changes."""
     server.watch(str(_tutorials(config)))
 
 
-def lesson_page(script: Path) -> tuple[str, dict[str, bytes]]:
-    """Runs a lesson and returns its page in Markdown, and its pictures by file name.
+def lesson(script: Path, cache: Path) -> Files:
+    """Returns the page and the pictures of a lesson, run if it has to be.
 
     Raises:
-        PluginError: a cell raises; the message names the script and the line.
+        PluginError: a cell of it raises; the message names the script and the line.
     """
-    import matplotlib as mpl
-    from matplotlib import pyplot as plt
 
-    namespace: dict[str, Any] = {"__name__": "__main__", "__file__": str(script)}
-    blocks: list[str] = []
-    pictures: dict[str, bytes] = {}
-    sys.path.insert(0, str(script.parent))
-    try:
-        with mpl.rc_context():
-            plt.style.use("default")  # whatever the user's settings say
-            mpl.rcParams["svg.hashsalt"] = "trdlab"  # the same bytes each time
-            for cell in split_cells(script.read_text(encoding="utf-8")):
-                if cell.is_prose:
-                    blocks.append(cell.text)
-                    continue
-                output = run_cell(cell, namespace, script)
-                first = len(pictures) + 1
-                names = [f"{script.stem}-{first + i}.svg" for i in range(len(output.figures))]
-                pictures |= dict(zip(names, output.figures, strict=True))
-                blocks += [f"```python\n{cell.text}\n```", *_shown(output, names)]
-    finally:
-        sys.path.remove(str(script.parent))
-        plt.close("all")
-    return "\n\n".join(blocks) + "\n", pictures
+    def hashed() -> str:
+        return fingerprint(
+            script, script.parent / "exercise.py", DOCS / "lesson.py", str(_PLAIN), _package()
+        )
+
+    def make() -> Files:
+        _log.info("Lesson %s: running", script.stem)
+        begun = perf_counter()
+        files = run_lesson(script)
+        _log.info("Lesson %s: done in %.0f s", script.stem, perf_counter() - begun)
+        return files
+
+    return made(cache, script.stem, hashed, make)
 
 
-def split_cells(source: str) -> Iterator[Cell]:
-    """Yields the cells of a script that are not blank; prose comes without its `# `."""
-    lines = source.splitlines()
-    marks = [(i, bool(m["prose"])) for i, s in enumerate(lines) if (m := _MARKER.match(s))]
-    ends = [i for i, _ in marks[1:]] + [len(lines)]
-    if marks and marks[0][0] > 0:  # code before the first marker
-        marks, ends = [(-1, False), *marks], [marks[0][0], *ends]
-    for (start, is_prose), end in zip(marks or [(-1, False)], ends, strict=True):
-        body = lines[start + 1 : end]
-        while body and not body[0].strip():
-            body, start = body[1:], start + 1
-        if is_prose:
-            body = [line.removeprefix("#").removeprefix(" ") for line in body]
-        if text := "\n".join(body).rstrip():
-            yield Cell(text, line=start + 2, is_prose=is_prose)
+def run_lesson(script: Path) -> Files:
+    """Runs a lesson in a process of its own and returns its page and its pictures."""
+    with TemporaryDirectory() as folder:
+        command = [sys.executable, "-P", str(DOCS / "lesson.py"), str(script), folder]
+        threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # lessons share the cores
+        done = subprocess.run(
+            command, env=os.environ | threads, capture_output=True, text=True, check=False
+        )
+        if done.returncode:
+            said = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+            raise PluginError(said if script.name in said else f"{script.name}: {said}")
+        return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
 
 
-def run_cell(cell: Cell, namespace: dict[str, Any], script: Path) -> Output:
-    """Runs a code cell and returns its output.
+def command_output(code: str, returncode: int, cache: Path) -> str:
+    """Returns what a command of a page prints, run if it has to be.
 
     Raises:
-        PluginError: the cell raises; the message names the script and the line.
+        ExecutionError: it ends with another code than the one that is expected.
     """
-    printed = io.StringIO()
-    try:
-        tree = ast.parse("\n" * (cell.line - 1) + cell.text, filename=str(script))
-        value, last = None, tree.body[-1] if tree.body else None
-        with redirect_stdout(printed):
-            if isinstance(last, ast.Expr):
-                tree.body.pop()
-            exec(compile(tree, str(script), "exec"), namespace)
-            if isinstance(last, ast.Expr):
-                expression = compile(ast.Expression(last.value), str(script), "eval")
-                value = eval(expression, namespace)
-    except Exception as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        lines = [frame.lineno for frame in frames if frame.filename == str(script)]
-        line = error.lineno if isinstance(error, SyntaxError) else (lines or [cell.line])[-1]
-        where = f"{script.parent.name}/{script.name}, line {line}"
-        raise PluginError(f"{where}: {type(error).__name__}: {error}") from error
-    figures = _take_figures(value)
-    text = printed.getvalue()
-    if value is None or figures:
-        return Output(text, figures=figures)
-    if hasattr(value, "_repr_html_"):
-        return Output(text, html=value._repr_html_())
-    return Output(f"{text}{value!r}\n")
+    folder = Path.cwd()  # of the block; its files, such as a map, count among the sources
+    own = [folder] if folder.is_relative_to(DOCS) else []
+
+    def make() -> Files:
+        begun = perf_counter()
+        done = subprocess.run(
+            ["bash", "-c", code],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+        )
+        if done.returncode != returncode:
+            said = markdown_exec.code_block("sh", done.stdout)
+            raise markdown_exec.ExecutionError(said, done.returncode)
+        if (seconds := perf_counter() - begun) > _SLOW:
+            _log.info("Command %s: %.0f s", code.strip().splitlines()[-1], seconds)
+        return {"output.txt": done.stdout.encode()}
+
+    thing = f"command-{sha256(f'{folder} {code}'.encode()).hexdigest()[:16]}"
+    files = made(cache, thing, lambda: fingerprint(code, *own, str(_PLAIN), _package()), make)
+    return files["output.txt"].decode()
 
 
-def _take_figures(value: Any) -> tuple[bytes, ...]:
-    """Returns the pictures of the figures that pyplot holds, and of a figure given; closes them."""
-    from matplotlib import pyplot as plt
-    from matplotlib.figure import Figure
-
-    figures = [plt.figure(number) for number in plt.get_fignums()]
-    if isinstance(value, Figure) and value not in figures:
-        figures.append(value)
-    pictures = []
-    for figure in figures:
-        file = io.BytesIO()
-        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
-        pictures.append(file.getvalue())
-        plt.close(figure)
-    return tuple(pictures)
+def _package() -> Path:
+    """Returns the folder of the package that the pages are about, wherever it was found."""
+    spec = find_spec("trdlab")
+    [folder] = (spec and spec.submodule_search_locations) or [""]
+    return Path(folder)
 
 
-def _shown(output: Output, pictures: list[str]) -> Iterator[str]:
-    """Yields the Markdown blocks of an output."""
-    if output.text.strip():
-        lines = [line.rstrip() for line in output.text.splitlines()]
-        yield "\n".join(["```{.text .output}", *lines, "```"])
-    if output.html:
-        yield f'<div class="output">{output.html}</div>'
-    for name in pictures:
-        yield f"![Drawn by the cell above]({name}){{ .output }}"
+def _cache(config: MkDocsConfig) -> Path:
+    return Path(config.config_file_path).parent / ".cache" / "docs"
 
 
 def _tutorials(config: MkDocsConfig) -> Path:

@@ -2,10 +2,12 @@
 
 import importlib.util
 import json
+import os
 import re
 import shlex
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -29,7 +31,10 @@ def _load(name: str) -> ModuleType:
     return module
 
 
-hooks, docstrings = _load("hooks"), _load("docstrings")
+with pytest.MonkeyPatch.context() as patch:
+    patch.syspath_prepend(ROOT / "docs")  # as MkDocs does for a hook
+    hooks, catalogue, kept = _load("hooks"), _load("catalogue"), _load("kept")
+    lesson_of, docstrings = _load("lesson"), _load("docstrings")
 
 Page = tuple[str, dict[str, bytes]]
 
@@ -44,23 +49,23 @@ def lesson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], P
     def page(source: str) -> Any:
         script = folder / "03_try.py"
         script.write_text(source, encoding="utf-8")
-        return hooks.lesson_page(script)
+        return lesson_of.lesson_page(script)
 
     return page
 
 
 def test_cells_are_prose_or_code_and_know_their_line() -> None:
     source = "import os\n\n# %% [markdown]\n# # Title\n#\n# Text.\n\n# %% a name\n\nx = 1\n\n# %%\n"
-    assert list(hooks.split_cells(source)) == [
-        hooks.Cell("import os", 1, is_prose=False),
-        hooks.Cell("# Title\n\nText.", 4, is_prose=True),
-        hooks.Cell("x = 1", 10, is_prose=False),
+    assert list(lesson_of.split_cells(source)) == [
+        lesson_of.Cell("import os", 1, is_prose=False),
+        lesson_of.Cell("# Title\n\nText.", 4, is_prose=True),
+        lesson_of.Cell("x = 1", 10, is_prose=False),
     ]
 
 
 def test_a_script_without_markers_is_one_cell() -> None:
-    assert list(hooks.split_cells("x = 1\n")) == [hooks.Cell("x = 1", 1, is_prose=False)]
-    assert list(hooks.split_cells("")) == []
+    assert list(lesson_of.split_cells("x = 1\n")) == [lesson_of.Cell("x = 1", 1, is_prose=False)]
+    assert list(lesson_of.split_cells("")) == []
 
 
 def test_prose_stays_prose_and_output_follows_its_code(lesson: Callable[[str], Page]) -> None:
@@ -120,15 +125,91 @@ def test_figures_become_pictures(lesson: Callable[[str], Page], cell: str, count
 def test_an_error_names_script_and_line(
     lesson: Callable[[str], Page], source: str, message: str
 ) -> None:
-    with pytest.raises(PluginError, match=re.escape(f"tutorials/03_try.py, {message}")):
+    with pytest.raises(lesson_of.LessonError, match=re.escape(f"tutorials/03_try.py, {message}")):
         lesson(source)
 
 
 def test_a_failing_lesson_leaves_the_path_as_it_was(lesson: Callable[[str], Page]) -> None:
     before = list(sys.path)
-    with pytest.raises(PluginError):
+    with pytest.raises(lesson_of.LessonError):
         lesson("# %%\n1 / 0\n")
     assert sys.path == before
+
+
+@pytest.fixture
+def counting(tmp_path: Path) -> tuple[Path, Path]:
+    """Returns a lesson that leaves a mark each time it is run, and the file of the marks."""
+    marks, script = tmp_path / "marks", tmp_path / "tutorials" / "03_try.py"
+    script.parent.mkdir()
+    (script.parent / "exercise.py").write_text("")
+    script.write_text(f"# %%\nopen({str(marks)!r}, 'a').write('|')\nprint('hello')\n")
+    return script, marks
+
+
+def test_a_lesson_is_run_again_only_if_its_sources_have_changed(
+    counting: tuple[Path, Path], tmp_path: Path
+) -> None:
+    (script, marks), cache = counting, tmp_path / "cache"
+    page = hooks.lesson(script, cache)
+    assert b"hello" in page["page.md"]
+    assert hooks.lesson(script, cache) == page
+    assert marks.read_text() == "|"
+    (script.parent / "exercise.py").write_text("# another\n")
+    assert hooks.lesson(script, cache) == page
+    assert marks.read_text() == "||"
+    assert len(list(cache.iterdir())) == 1  # what is out of date is gone
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", None], ids=["empty", "no archive", "cut"])
+def test_a_torn_result_is_made_again(tmp_path: Path, content: bytes | None) -> None:
+    made: list[str] = []
+
+    def make() -> dict[str, bytes]:
+        made.append("|")
+        return {"page.md": b"hello"}
+
+    for _ in range(2):
+        assert kept.made(tmp_path, "a", lambda: "hash", make) == {"page.md": b"hello"}
+    [file] = tmp_path.iterdir()
+    file.write_bytes(file.read_bytes()[:-30] if content is None else content)
+    for _ in range(2):
+        assert kept.made(tmp_path, "a", lambda: "hash", make) == {"page.md": b"hello"}
+    assert len(made) == 2
+
+
+def test_a_changed_byte_in_a_result_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "a-1.zip"
+    kept.keep(path, {"page.md": b"0123456789" * 9})
+    whole = path.read_bytes()
+    assert kept.kept(path) == {"page.md": b"0123456789" * 9}
+    for place in range(30, 60):  # in the name or in the content
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        assert kept.kept(path) in (None, {"page.md": b"0123456789" * 9})
+
+
+def test_what_changes_while_it_is_made_is_not_kept(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_text("1")
+
+    def make() -> dict[str, bytes]:
+        source.write_text("2")
+        return {"a": b""}
+
+    kept.made(tmp_path / "cache", "a", lambda: kept.fingerprint(source), make)
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_failing_lesson_says_where_and_is_not_kept(
+    counting: tuple[Path, Path], tmp_path: Path
+) -> None:
+    script, _ = counting
+    script.write_text("# %%\nimport os\n1 / 0\n")
+    with pytest.raises(PluginError, match=r"^tutorials/03_try\.py, line 3: ZeroDivisionError"):
+        hooks.lesson(script, tmp_path / "cache")
+    script.write_text("# %%\nimport os\nos._exit(7)\n")
+    with pytest.raises(PluginError, match=r"^03_try\.py: exit code 7$"):
+        hooks.lesson(script, tmp_path / "cache")
+    assert not (tmp_path / "cache").exists()
 
 
 def test_examples_become_code_and_errata_rows_links() -> None:
@@ -136,7 +217,7 @@ def test_examples_become_code_and_errata_rows_links() -> None:
         "A sum (errata P1, C5). P2.\n\n>>> f(1)\n2\n>>> f(2)\n\nArgs:\n    x: it."
     )
     assert prepared == (
-        "A sum (errata [P1](../errata.md#p1), [C5](../errata.md#c5)). P2.\n\n"
+        "A sum (errata [P1][p1], [C5][c5]). P2.\n\n"
         "```pycon\n>>> f(1)\n2\n>>> f(2)\n```\n\nArgs:\n    x: it."
     )
 
@@ -164,7 +245,121 @@ def test_signatures_show_the_default_of_a_setting_and_no_more() -> None:
     assert [str(of.default) for of in init.parameters][1:] == ["1", "f(2)"]
 
 
+def test_a_named_tuple_is_shown_with_its_signature(tmp_path: Path) -> None:
+    griffe = pytest.importorskip("griffe")
+    (tmp_path / "pair.py").write_text(
+        "from typing import NamedTuple\n"
+        "class Pair(NamedTuple):\n    left: int\n    right: int = 2\n"
+    )
+    extensions = griffe.load_extensions(docstrings.Docstrings())
+    package = griffe.load("pair", search_paths=[tmp_path], extensions=extensions)
+    shown = [(str(of.name), of.default) for of in package["Pair"].parameters]
+    assert shown == [("self", None), ("left", None), ("right", "2")]
+
+
+PACKAGE = """
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    from rooms.kitchen.oven import bake
+    from rooms.door import Door
+__all__ = ["Door", "bake"]
+"""
+OVEN = '''
+"""Ovens: how hot."""
+
+@COOKING.rule("{dish} needs {time:steps}{much}.")
+def needs_long(dish):
+    """Where it needs more than an hour (errata P1)."""
+
+@COOKING.rule("{dish} is raw.", kind="raw")
+def _raw(dish): ...
+
+def bake(dish):
+    """Bakes a dish.
+
+    Slowly.
+    """
+
+def _warm(): ...
+'''
+
+
+@pytest.fixture
+def rooms(tmp_path: Path) -> Path:
+    """Returns a folder with a small package."""
+    kitchen = tmp_path / "rooms" / "kitchen"
+    kitchen.mkdir(parents=True)
+    (kitchen / "__init__.py").write_text("")
+    (kitchen / "oven.py").write_text(OVEN)
+    (kitchen / "_hidden.py").write_text("class Hidden: ...")
+    (kitchen.parent / "__init__.py").write_text(PACKAGE)
+    (kitchen.parent / "door.py").write_text('class Door:\n    """A door."""\n')
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("names: rooms", ["::: rooms.Door"]),
+        ("names: rooms.kitchen", ["::: rooms.bake"]),
+        ("modules: rooms.kitchen", ["::: rooms.kitchen.oven"]),
+        ("table: rooms", ["[`Door`][rooms.door.Door] | A door. |", "| Bakes a dish. |"]),
+        (
+            "sentences: rooms.kitchen",
+            [
+                "### Ovens: how hot\n",
+                "`needs-long`\n\n:   “<var>dish</var> needs <var>time</var> <var>much</var>.”\n",
+                "\n    Where it needs more than an hour (errata [P1][p1]).\n",
+                "`raw`\n\n:   “<var>dish</var> is raw.”\n",
+            ],
+        ),
+        ("sentences: rooms", []),
+    ],
+)
+def test_lists_of_the_reference_are_read_from_the_source(
+    rooms: Path, line: str, found: list[str]
+) -> None:
+    page = catalogue.expanded(f"# A\n\n<!-- {line} -->\n", rooms)
+    assert all(part in page for part in found)
+    assert page.count(":::") == sum(part.startswith(":::") for part in found)
+    assert "<!--" not in page
+
+
+@pytest.mark.parametrize("line", ["names: rooms.garden", "table: rooms.kitchen"])
+def test_a_list_of_nothing_is_refused(rooms: Path, line: str) -> None:
+    with pytest.raises(LookupError, match=line.split()[1]):
+        catalogue.expanded(f"<!-- {line} -->", rooms)
+
+
+def names_of(identifier: str, members: list[str]) -> set[tuple[str, Path]]:
+    """Returns the names that a directive of a page documents, each with its file."""
+    path = ROOT.joinpath(*identifier.split("."))
+    if path.is_dir():
+        return set(catalogue.exports(path, ROOT))
+    module = path.with_suffix(".py")
+    if module.exists():
+        names = {name for name, _ in catalogue.public(module)}
+        return {(name, module) for name in names if name in members or not members}
+    return {of for of in catalogue.exports(path.parent, ROOT) if of[0] == path.name}
+
+
+def test_every_name_that_a_package_exports_is_documented_once() -> None:
+    documented: Counter[tuple[str, Path]] = Counter()
+    for page in (ROOT / "docs" / "reference").rglob("*.md"):
+        text = catalogue.expanded(page.read_text(encoding="utf-8"), ROOT)
+        for directive in re.findall(r"^::: .+(?:\n    .*)*", text, re.MULTILINE):
+            members = re.search(r"members: \[(.*)\]", directive)
+            documented.update(
+                names_of(directive.split()[1], members[1].split(", ") if members else [])
+            )
+    packages = [file.parent for file in (ROOT / "trdlab").rglob("__init__.py")]
+    exported = {name for package in packages for name in catalogue.exports(package, ROOT)}
+    counts = {f"{file.stem}.{name}": documented[name, file] for name, file in exported}
+    assert [f"{name}: {count} times" for name, count in counts.items() if count != 1] == []
+
+
 README, TRAIN = (ROOT / "README.md", ROOT / "docs" / "train.md")
+INSTALL = ROOT / "docs" / "install.md"
 RUN, GAME = "CartPole-v1-N10-w1-seed1", "Breakout-N40-w1-seed1"
 
 
@@ -176,11 +371,12 @@ def blocks(page: Path, kind: str) -> list[str]:
 def shown_commands() -> list[str]:
     lines = [
         line
-        for page in (README, TRAIN)
+        for page in (README, INSTALL, TRAIN)
         for block in blocks(page, "console")
         for line in block.splitlines()
     ]
-    return [line.removeprefix("$ ") for line in lines if line.startswith("$ trdlab")]
+    told = [line.removeprefix("$ ") for line in lines if line.startswith("$ trdlab")]
+    return [line for line in told if line != "trdlab --version"]  # which parses nothing else
 
 
 @pytest.mark.parametrize("command", shown_commands())
@@ -233,6 +429,17 @@ def test_the_python_that_is_shown_runs(
     for block in shown:
         exec(block, namespace)
     assert capsys.readouterr().out
+
+
+def test_the_readme_shows_what_the_command_prints() -> None:
+    """If this fails, paste what it prints now."""
+    words = shlex.split("gridworld --gamma 0.95 --N 2 --w 2")
+    command = [sys.executable, "-m", "trdlab", *words]
+    env = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
+    printed = subprocess.run(command, capture_output=True, encoding="utf-8", env=env, check=True)
+    lines = "\n".join(line.rstrip() for line in printed.stdout.splitlines())
+    [shown] = blocks(README, "text")
+    assert shown in lines
 
 
 def test_the_files_of_a_run_are_those_of_the_table(trained: Path) -> None:
@@ -300,3 +507,4 @@ def test_a_command_that_fails_on_a_page_fails_the_build(
     done = build(tmp_path / "mkdocs.yml", tmp_path / "site")
     assert (done.returncode == 0) == ok, done.stderr
     assert ok or "trdlab nonsense" in done.stderr
+    assert len(list((tmp_path / ".cache").rglob("*.zip"))) == ok

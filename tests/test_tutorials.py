@@ -1,5 +1,6 @@
 """The lessons run as a new user runs them, and their exercises know right from wrong."""
 
+import ast
 import importlib.util
 import re
 import shutil
@@ -123,6 +124,16 @@ def test_lesson_prints_the_same_each_time(lesson: Path, tmp_path: Path) -> None:
     assert run(lesson, tmp_path) == printed_by(lesson)
 
 
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.stem)
+def test_a_notebook_shows_each_figure_once_and_nothing_else(lesson: Path) -> None:
+    """Notebooks show what pyplot has drawn; and the value of a cell's last line beside it."""
+    for cell in re.split(r"^# %%.*$", lesson.read_text(encoding="utf-8"), flags=re.MULTILINE):
+        if "plt.subplots" in cell:
+            last = ast.parse(cell).body[-1]
+            returns_nothing = ast.unparse(last).startswith(("ax.set_yscale", "add_legend"))
+            assert returns_nothing or not isinstance(last, ast.Expr)
+
+
 def test_first_lesson_shows_the_numbers_of_the_paper() -> None:
     for line in (
         "Q(up)   = 3.26",
@@ -173,7 +184,7 @@ def test_fifth_lesson_learns_from_pixels_what_is_exact() -> None:
 def test_sixth_lesson_names_each_planted_fault_and_no_other() -> None:
     """From five logs: the done-when of the lesson. Dora is the healthy one."""
     printed = printed_by(LESSONS[5])
-    row = r"^ +\d +ShiftedReward +WrongDiscount +IgnoredEnd +none$"
+    row = r"^ +\d +mistimed +discount-off +end-ignored +none$"
     assert len(re.findall(row, printed, re.MULTILINE)) == 5
     for name in ("Ada", "Ben", "Cleo"):
         assert f"{name}, repaired: none" in printed
@@ -187,13 +198,13 @@ def test_sixth_lesson_reads_to_a_student_what_is_wrong() -> None:
         )
     }
     assert "It expects rewards 1 step too early." in reports["Ada"]
-    assert "and not by γ^w = 0.9025." in reports["Ben"]
+    assert "by 0.947, and not by 0.90" in reports["Ben"]
     assert "It ignores where episodes end" in reports["Cleo"]
-    complaints = ("too early", "too late", "and not by", "ignores", "times as much")
+    complaints = ("too early", "too late", "and not by", "ignores", "% of what comes")
     named = {name: [x for x in complaints if x in text] for name, text in reports.items()}
-    assert named["Emil"] == ["times as much"]
+    assert named["Emil"] == ["% of what comes"]
     assert not named["Dora"]
-    assert "over its whole horizon" in reports["Dora"]
+    assert "better than a guess about what comes at any time" in reports["Dora"]
 
 
 @pytest.mark.parametrize("name", exercise.EXERCISES)

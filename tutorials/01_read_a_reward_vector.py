@@ -20,7 +20,8 @@ from textwrap import fill
 from matplotlib import pyplot as plt
 
 from trdlab.decomposition import TimeAxis
-from trdlab.explanations import explain, gridworld_moment, sentence
+from trdlab.explanations import gridworld_moment
+from trdlab.explanations.moment.telling import sections
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.render import draw_map
 from trdlab.show.plots.moment import plot_components
@@ -41,8 +42,7 @@ print("\n".join(world.grid.rows))
 
 # %%
 figure, ax = plt.subplots(figsize=(4, 2.4), layout="constrained")
-draw_map(ax, world, state=0)
-figure
+_ = draw_map(ax, world, state=0)
 
 # %% [markdown]
 # The drone decides once, in its first step. Both routes take five steps, and both pay 4.
@@ -127,7 +127,6 @@ colours = action_colours(world.action_names)
 for ax, name, vector in zip(axes, ("up", "down"), (up, down), strict=True):
     plot_components(ax, vector.components, table.time_axis, colour=colours[name])
     ax.set_title(name, loc="left", pad=20)
-figure
 
 # %% [markdown]
 # ## Read the rewards themselves
@@ -174,10 +173,10 @@ down - up
 
 # %%
 moment = gridworld_moment(world, table, start)
-explanation = explain(moment, action="down", foil="up")
-for finding in explanation.contrast:
-    said = sentence(finding, explanation)
-    print(fill(f"- {said}", width=80, subsequent_indent="  "))
+for section in sections(moment.choice("down", "up"))[:2]:
+    print(section.heading)
+    for sentence in section.sentences:
+        print(fill(f"- {sentence}", width=80, subsequent_indent="  "))
 
 # %% [markdown]
 # ## How much does the drone care about "sooner"?

@@ -130,8 +130,7 @@ ax.plot(steady, color="tab:orange", label="α = 0.3")
 ax.plot(shrinking, color="tab:blue", label="α = 1/n")
 ax.axhline(0.9 * 4 - 0.05 * 4, color="black", lw=0.8, ls="--", label="true: 3.4")
 ax.set(xlabel="tries", ylabel="component 0")
-ax.legend(loc="lower right", ncols=3, frameon=False)
-figure
+_ = ax.legend(loc="lower right", ncols=3, frameon=False)
 
 # %% [markdown]
 # The steady learner is thrown off by every accident, for ever. The other one takes an average, and
@@ -277,8 +276,7 @@ ax.errorbar(
 ax.axhline(0, color="black", lw=0.8)
 ax.set(xlabel="steps from now", ylabel="discounted reward")
 ax.set_xticks(steps, AHEAD.labels[:-1])
-ax.legend(frameon=False)
-figure
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # Two different doubts should not be confused. *The world* may be uncertain: then even the exact

@@ -66,11 +66,10 @@ for seed in range(3):
 # %%
 figure, axes = plt.subplots(2, sharey=True, figsize=(6, 4.2), layout="constrained")
 colour = action_colours(drone.action_names)["down"]
-plot_components(axes[0], truth[0, DOWN].components, AXIS, colour=colour)
-plot_components(axes[1], down.components, AXIS, colour=colour)
-axes[0].set_title("down, exact", loc="left", pad=20)
-axes[1].set_title("down, learned with the loss on the sum", loc="left", pad=20)
-figure
+shown = {"exact": truth[0, DOWN], "learned with the loss on the sum": down}
+for ax, (how, vector) in zip(axes, shown.items(), strict=True):
+    plot_components(ax, vector.components, AXIS, colour=colour)
+    ax.set_title(f"down, {how}", loc="left", pad=20)
 
 # %% [markdown]
 # ### Where it ends

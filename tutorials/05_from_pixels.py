@@ -7,7 +7,7 @@
 # know this small world exactly, we can check every number it says.
 #
 # You need [lesson 3](03_learn_it.md) and [lesson 4](04_why_the_sum_fails.md). The network learns
-# for about two minutes; the rest takes half an hour.
+# for one to three minutes, as your machine is quick or slow; the rest takes half an hour.
 
 # %%
 import gymnasium as gym
@@ -52,7 +52,6 @@ for ax, (title, picture) in zip(axes, shown.items(), strict=True):
     ax.imshow(picture, cmap="gray", vmin=0, vmax=255)
     ax.set_title(title, fontsize=10)
     ax.axis("off")
-figure
 
 # %% [markdown]
 # Nobody tells the network what a drone is, or a coin. It gets 7056 numbers, and most of them never
@@ -72,7 +71,7 @@ settings = TrainSettings(
     horizon=4,
     num_envs=8,
     epsilon_end=1.0,  # act at random throughout
-    agent_steps=12_800,
+    agent_steps=11_800,
     learning_starts=4_800,
     update_every=4,
     batch_size=64,
@@ -165,9 +164,8 @@ for copy in range(250, updates[-1], 250):
 ax.set(
     xlabel="updates (dotted: a copy to the target network)", ylabel="largest error"
 )
-ax.set_yscale("log")
 ax.legend(frameon=False, ncols=3)
-figure
+ax.set_yscale("log")
 
 # %% [markdown]
 # **One component after another.** Component 0 needs no target network: it is the reward itself.

@@ -21,10 +21,10 @@ from trdlab.agents import Agent
 from trdlab.bellman import target
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations import assess, explain, moment_at
-from trdlab.explanations.calibration.claims import sections
+from trdlab.explanations import assess, moment_at
+from trdlab.explanations.calibration import claims
 from trdlab.explanations.calibration.faults import faults
-from trdlab.explanations.moment.sentences import sentence
+from trdlab.explanations.moment import telling
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
 from trdlab.show.plots.calibration import plot_trust, trust_handles
@@ -217,15 +217,11 @@ def agent(name, table, axis):
     )
 
 
-def say(texts):
-    """Prints sentences, one below the other."""
-    for text in texts:
-        print(textwrap.indent(textwrap.fill(text, 78), "  "))
-
-
-def say_all(report):
-    """Prints all that a report says."""
-    say(text for section in sections(report) for text in section.sentences)
+def say(sections):
+    """Prints the sentences of some sections, one below the other."""
+    for section in sections:
+        for sentence in section.sentences:
+            print(textwrap.indent(textwrap.fill(sentence, 78), "  "))
 
 
 agents = {
@@ -237,9 +233,9 @@ agents = {
 
 # %%
 for name, of in agents.items():
-    explanation = explain(moment_at(of, step=8))
+    told = telling.sections(moment_at(of, step=8).choice())
     print(f"{name}:")
-    say(sentence(finding, explanation) for finding in explanation.forecast)
+    say(section for section in told if section.name == "forecast")
 
 # %% [markdown]
 # Each of these texts could be true. Nothing that an agent *says* shows whether it is right. So
@@ -249,7 +245,7 @@ for name, of in agents.items():
 reports = {name: assess(of, episodes=300) for name, of in agents.items()}
 
 print("Dora's report says:")
-say_all(reports["Dora"])
+say(claims.sections(reports["Dora"]))
 
 # %% [markdown]
 # Dora's forecasts are better than a guess at every step. How much comes later than she tells is
@@ -258,7 +254,7 @@ say_all(reports["Dora"])
 # %%
 for name in ("Ada", "Ben", "Cleo"):
     print(f"{name}'s report says:")
-    say_all(reports[name])
+    say(claims.sections(reports[name]))
 
 # %%
 figure, axes = plt.subplots(4, figsize=(6, 12), layout="constrained")
@@ -266,7 +262,6 @@ for ax, (name, report) in zip(axes, reports.items(), strict=True):
     plot_trust(ax, report)
     ax.set_title(name, loc="right", fontsize=11, fontweight="bold")
 add_legend(figure, trust_handles(reports["Ada"]))
-figure
 
 # %% [markdown]
 # **Look at the pictures first.** Ada's skill is gone from the first step on. Those of Ben and Cleo
@@ -278,7 +273,7 @@ figure
 # of one step must be γ^w times component i − 1 of the next. For this it needs no rewards at all.
 #
 # - Ada "expects rewards 1 step too early". All her rewards are there, but in the wrong place.
-# - Ben "discounts what comes 2 steps later by" about 0.95, "and not by 0.903", which is γ^w. He
+# - Ben "discounts what comes 2 steps later by" about 0.95, and not by γ^w, which is 0.9025. He
 #   groups two steps, so from one component to the next two steps pass.
 # - Cleo "ignores where episodes end". What she adds there is what the start of the next one
 #   promises, all of it. (It is a little more than all, because in her log flights began anywhere.)
@@ -355,7 +350,7 @@ def emil(log, axis, table):
 
 print("Emil's report says:")
 emils = assess(agent("Emil", learn(emil, PAIRS, log), PAIRS), episodes=300)
-say_all(emils)
+say(claims.sections(emils))
 
 # %% [markdown]
 # No fault is named, and still the report is no good one: from some step on his forecasts are no

@@ -12,8 +12,7 @@ from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison import claims as comparing
 from trdlab.explanations.comparison.comparison import SIDES, Comparison
 from trdlab.explanations.episode.played import Played
-from trdlab.explanations.explanation import Explanation, Part
-from trdlab.explanations.moment.moment import Choice
+from trdlab.explanations.explanation import Explanation
 from trdlab.explanations.rules import plain_data
 from trdlab.explanations.words import counted
 from trdlab.formatting import decimals_for, number
@@ -37,7 +36,7 @@ def _(explanation: Explanation) -> Document:
         heading=" · ".join(heading),
         setting=(*axis_words(explanation.time_axis), *_played(explanation)),
         scene=None if state is None or agent.world is None else scene_of(agent.world, state),
-        table=None if choice is None else action_table(_shown(choice, explanation.parts)),
+        table=_shown(explanation),
         answer=tuple(claim.sentence for claim in explanation.answer),
         sections=explanation.sections,
         folded=not explanation.parts,
@@ -66,9 +65,12 @@ def _(comparison: Comparison) -> Document:
     )
 
 
-def _shown(choice: Choice, parts: tuple[Part, ...]) -> Choice:
-    """Returns whose actions are shown; the difference of two only to who asks for a contrast."""
-    return choice if not parts or "contrast" in parts else replace(choice, foil=None)
+def _shown(explanation: Explanation) -> Table | None:
+    """Returns the actions shown; the difference of two only to who asks for a contrast."""
+    choice, parts = explanation.choice, explanation.parts
+    if choice is None:
+        return None
+    return action_table(choice if not parts or "contrast" in parts else replace(choice, foil=None))
 
 
 def _played(explanation: Explanation) -> list[str]:

@@ -7,7 +7,7 @@ their text can be read on a phone; they need no pyplot, and no backend of the us
 """
 
 import io
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -195,15 +195,16 @@ def label_steps(ax: Axes, axis: TimeAxis, places: FloatArray) -> None:
     ax.set_xlim(places[0] - 0.6, places[-1] + 0.6)
 
 
-def draw_grounds(ax: Axes, places: FloatArray, status: Sequence[str]) -> None:
-    """Colours the ground of components by the evidence for them."""
+def draw_grounds(ax: Axes, places: FloatArray, status: Sequence[str | None]) -> None:
+    """Colours the ground of components by the evidence for them; None has no ground."""
     for place, found in zip(places, status, strict=True):
-        ax.axvspan(place - 0.5, place + 0.5, color=EVIDENCE[found], linewidth=0, zorder=0)
+        if found is not None:
+            ax.axvspan(place - 0.5, place + 0.5, color=EVIDENCE[found], linewidth=0, zorder=0)
 
 
-def ground_handles(status: Collection[str]) -> list[Patch]:
+def ground_handles(status: Iterable[str | None]) -> list[Patch]:
     """Returns what a legend explains of grounds: only those that there are."""
-    there = {EVIDENCE[found] for found in status}
+    there = {EVIDENCE[found] for found in status if found is not None}
     return [Patch(color=c, label=meaning) for c, meaning in GROUNDS.items() if c in there]
 
 

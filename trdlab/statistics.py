@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -152,11 +153,14 @@ def by_episode(sums: FloatArray, statistic: Statistic, *, seed: int = 0) -> Esti
     return percentiles(values, has_enough(sums))
 
 
+@lru_cache(maxsize=1)  # all that is asked of the same episodes is asked in a row
 def draws(count: int, seed: int) -> FloatArray:
     """Returns `[1 + R, E]`: how often each of E episodes counts, in the first row once each."""
     rng = np.random.default_rng(seed)
     drawn = rng.multinomial(count, np.full(count, 1.0 / count), size=RESAMPLES)
-    return np.concatenate([np.ones((1, count)), drawn])
+    found = np.concatenate([np.ones((1, count)), drawn])
+    found.setflags(write=False)
+    return found
 
 
 def pooled(drawn: FloatArray, sums: FloatArray) -> FloatArray:

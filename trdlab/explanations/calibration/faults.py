@@ -11,6 +11,7 @@ from trdlab.explanations.calibration.errors import SLACK as AMOUNT
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.rules import Claim, Fields, Form, Language, every
 from trdlab.explanations.words import forms_of
+from trdlab.statistics import FEWEST_EPISODES
 
 EXPLAINED = 0.95
 """The share of the components that must fit what follows, for a fault between them to be named."""
@@ -90,12 +91,16 @@ def smeared(report: CalibrationReport) -> Iterator[Fields]:
     }
 )
 def beyond(report: CalibrationReport) -> Iterator[tuple[str, Fields]]:
-    """It expects more, or less, than if every step paid the most, or the least, that one did."""
+    """It expects more, or less, than if every step paid the most, or the least, that one did.
+
+    Few episodes without any reward, or without any cost, do not tell that none can come.
+    """
     (least, most), paid = report.calibration.predicted_range[:, -1].tolist(), report.judged
     whole, slack = 1.0 / (1.0 - report.time_axis.gamma), _ROUNDING * report.scale
-    if most > (limit := max(paid.most, 0.0) * whole) + slack:
+    is_few = paid.different < FEWEST_EPISODES
+    if most > (limit := max(paid.most, 0.0) * whole) + slack and not (is_few and not limit):
         yield "overestimates", {"said": most, "most": limit, "reward": paid.most}
-    if least < (limit := min(paid.least, 0.0) * whole) - slack:
+    if least < (limit := min(paid.least, 0.0) * whole) - slack and not (is_few and not limit):
         yield "underestimates", {"said": least, "least": limit, "reward": paid.least}
 
 

@@ -300,6 +300,15 @@ def test_more_than_can_come_is_an_overestimate():
     )
 
 
+def test_one_episode_without_a_reward_does_not_tell_that_none_can_come():
+    axis = TimeAxis(0.9, 1)
+    rows = [[0.0, 0.3]] * 31
+    alone = judge(Future("a policy"), [episode([0.0] * 30, axis, rows)])
+    many = [episode([0.0] * length, axis, rows[: length + 1]) for length in range(10, 30)]
+    kinds = [[claim.kind for claim in told(of)] for of in (alone, judge(alone.future, many))]
+    assert ["overestimates" in of for of in kinds] == [False, True]
+
+
 def test_chance_that_copies_share_is_told_by_the_episodes():
     report = next(r for r in real() if r.ceiling is not None and r.ceiling.deterministic)
     assert not report.chance

@@ -16,7 +16,6 @@ from trdlab.estimator import Future
 from trdlab.explanations.calibration.consistency import Consistency, consistency_of
 from trdlab.explanations.calibration.faults import (
     amount_off,
-    discount_exponent,
     faults,
     is_discount_wrong,
     off_from,
@@ -222,5 +221,5 @@ def test_pairs_leave_out_what_random_actions_and_truncations_hide():
 
 def test_an_audit_that_says_nothing_names_nothing():
     silent: Consistency = consistency_of([predicted([[0.0, 0.0]] * 4, TimeAxis(0.5, 1))] * 12)
-    assert np.isnan(discount_exponent(silent).value)
+    assert np.isnan(silent.discount.value)
     assert not is_discount_wrong(silent)

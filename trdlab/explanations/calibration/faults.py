@@ -11,7 +11,7 @@ from trdlab.explanations.calibration.errors import SLACK as AMOUNT
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.rules import Claim, Fields, Form, Language, every
 from trdlab.explanations.words import forms_of
-from trdlab.statistics import Estimate
+from trdlab.statistics import FEWEST_EPISODES
 
 EXPLAINED = 0.95
 """The share of the components that must fit what follows, for a fault between them to be named."""
@@ -91,12 +91,16 @@ def smeared(report: CalibrationReport) -> Iterator[Fields]:
     }
 )
 def beyond(report: CalibrationReport) -> Iterator[tuple[str, Fields]]:
-    """It expects more, or less, than if every step paid the most, or the least, that one did."""
+    """It expects more, or less, than if every step paid the most, or the least, that one did.
+
+    Few episodes without any reward, or without any cost, do not tell that none can come.
+    """
     (least, most), paid = report.calibration.predicted_range[:, -1].tolist(), report.judged
     whole, slack = 1.0 / (1.0 - report.time_axis.gamma), _ROUNDING * report.scale
-    if most > (limit := max(paid.most, 0.0) * whole) + slack:
+    is_few = paid.different < FEWEST_EPISODES
+    if most > (limit := max(paid.most, 0.0) * whole) + slack and not (is_few and not limit):
         yield "overestimates", {"said": most, "most": limit, "reward": paid.most}
-    if least < (limit := min(paid.least, 0.0) * whole) - slack:
+    if least < (limit := min(paid.least, 0.0) * whole) - slack and not (is_few and not limit):
         yield "underestimates", {"said": least, "least": limit, "reward": paid.least}
 
 
@@ -140,22 +144,8 @@ def faults(report: CalibrationReport) -> list[Claim]:
 
 def is_discount_wrong(found: Consistency) -> bool:
     """Returns whether the discount is surely wrong (see `faults`)."""
-    if not found.explained >= EXPLAINED:
-        return False
-    gamma, width = found.time_axis.gamma, found.time_axis.width
-    parts = [_exponent(of, gamma) for of in (found.discount_near, found.discount_far)]
-    exponent, known = discount_exponent(found), [part for part in parts if not math.isnan(part)]
-    below, above = (1.0 - SLACK) * width, (1.0 + SLACK) * width
-    return max(exponent.high, *known) < below or min(exponent.low, *known) > above
-
-
-def discount_exponent(found: Consistency) -> Estimate:
-    """Returns x, where components are multiplied by γ^x from one to the next; w if all is well."""
-    of, gamma = found.discount, found.time_axis.gamma
-    return Estimate(*(_exponent(discount, gamma) for discount in (of.value, of.high, of.low)))
-
-
-def _exponent(discount: float, gamma: float) -> float:
-    if math.isnan(discount) or gamma == 0.0:
-        return math.nan
-    return math.log(discount) / math.log(gamma) if discount > 0.0 else math.inf
+    gamma, width, whole = found.time_axis.gamma, found.time_axis.width, found.discount
+    parts = [of for of in (found.discount_near, found.discount_far) if not math.isnan(of)]
+    least, most = (gamma ** ((1.0 + sign * SLACK) * width) for sign in (1.0, -1.0))
+    is_wrong = min([whole.low, *parts]) > most or max([whole.high, *parts]) < least
+    return is_wrong and found.explained >= EXPLAINED

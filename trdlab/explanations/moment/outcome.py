@@ -102,8 +102,8 @@ _MORE = "{component:at}{more} {component:paid} %s more than {less}"
             f"{_MORE % 'at most {most:number}'}, less than the {{said:number}} that was forecast."
         ),
         "against-the-forecast": (
-            "Against the forecast, {component:at}{less} {component:paid} {ahead:estimate} more than "
-            "{more}; {more} was to be {said:number} ahead."
+            "Against the forecast, {component:at}{less} {component:paid} {ahead:estimate} more "
+            "than {more}; {more} was to be {said:number} ahead."
         ),
         "no-difference": (
             f"Against the forecast, {_MORE % 'no'}; {{said:number}} more was forecast."

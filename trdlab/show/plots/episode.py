@@ -1,6 +1,7 @@
 """An episode: what was done, what was expected all along, and the rewards that came."""
 
 from itertools import groupby, pairwise
+from textwrap import wrap
 from typing import Any, Literal
 
 import numpy as np
@@ -17,14 +18,14 @@ from trdlab.explanations.episode.story import Story, place
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.render import draw_map
 from trdlab.show.plots import style
-from trdlab.show.plots.map import map_height, plot_route, route_taken
-from trdlab.tabular import ExactTable
+from trdlab.show.plots.map import map_height, plot_route
 from trdlab.time_axis import axis_title
 
 _SHADES = (style.COST, "#ffffff", style.EXPECTED)
 _COLOURS = LinearSegmentedColormap.from_list("costs to rewards", _SHADES)
 _REWARDS = LinearSegmentedColormap.from_list("rewards", _SHADES[1:])
 _VEIL = 0.6  # of white, over what is not to be trusted
+_BESIDE = (-0.04, -0.01)  # of the axes: where the evidence for a row is shown
 _HARDLY = 0.02  # negative values below this share of the largest need no colour of their own
 _MOST_LABELS = 8
 _MOST_DOTS = 60
@@ -42,7 +43,6 @@ def story_figure(
     *,
     trust: Trust | None = None,
     world: Gridworld | None = None,
-    table: ExactTable | None = None,
 ) -> Figure:
     """Returns the picture of an episode; the sentence of each key moment stands below it.
 
@@ -51,14 +51,13 @@ def story_figure(
         title: of the picture.
         trust: how far such forecasts can be trusted, if that is known.
         world: the gridworld it was played in; its map is drawn, with the way that was taken.
-        table: the exact table of that world.
     """
-    played = told.played
-    lines = [f"{number}  {claim.sentence}" for number, claim in enumerate(told.moments, 1)]
-    states = None if table is None else route_taken(table, played.episode)
+    played, states = told.played, told.played.episode.states
+    says = (f"{number}  {claim.sentence}" for number, claim in enumerate(told.moments, 1))
+    lines = [line for sentence in says for line in wrap(sentence, style.LETTERS)]
+    handles = _handles(played) + style.ground_handles(() if trust is None else trust.status)
     top = 0.0 if world is None or states is None else _MAP * map_height(world)
-    height = 4.8 + top + sum(_LINE * -(-len(line) // style.LETTERS) for line in lines)
-    figure = style.new_figure(height, title)
+    figure = style.new_figure(4.6 + top + _LINE * (len(lines) + len(handles) / 2), title)
     ratios = [*[top] * bool(top), 0.3, 2.4, 0.9]
     *maps, strip, ax, below = figure.subplots(len(ratios), 1, height_ratios=ratios)
     if world is not None and states is not None:
@@ -68,9 +67,7 @@ def story_figure(
     extend = _extend(played.episode.predicted)
     bar = figure.colorbar(ax.images[-1], ax=ax, pad=0.02, aspect=14, extend=extend)
     bar.ax.tick_params(labelsize=style.TEXT)
-    is_pale = trust is not None and bool(trust.doubtful.any())
-    note = axis_title(played.episode.time_axis) + " · pale: not proved, or not tested" * is_pale
-    style.add_legend(figure, _handles(played), *lines, note)
+    style.add_legend(figure, handles, *lines, axis_title(played.episode.time_axis))
     return figure
 
 
@@ -99,7 +96,7 @@ def plot_story(ax: Axes, below: Axes, told: Story, trust: Trust | None = None) -
 
     Above, a column is a step of the episode, and a row is how many steps ahead; the residual stands
     apart on top. A reward that is expected at its right step runs down a diagonal until it comes.
-    What is not to be trusted is pale.
+    Beside each row is the evidence for it; what has not proved better than a guess is pale.
 
     Args:
         ax: the axes of what was expected.
@@ -136,14 +133,18 @@ def _plot_expected(ax: Axes, told: Story, trust: Trust | None) -> None:
         steps, rows = block.shape
         extent = (-0.5, steps - 0.5, bottom - 0.5, bottom + rows - 0.5)
         ax.imshow(block.T, origin="lower", extent=extent, aspect="auto", **how)
-    for row, is_doubtful in enumerate(() if trust is None else trust.doubtful):
-        if is_doubtful:
-            at = row if row < horizon else top
-            ax.axhspan(at - 0.5, at + 0.5, color="white", alpha=_VEIL, linewidth=0, zorder=2)
+    for row, found in enumerate(() if trust is None else trust.status):
+        at = row if row < horizon else top
+        ends, look = (at - 0.5, at + 0.5), {"linewidth": 0, "zorder": 2}
+        ax.axhspan(*ends, *_BESIDE, color=style.EVIDENCE[found], clip_on=False, **look)
+        if found != "good":
+            ax.axhspan(*ends, color="white", alpha=_VEIL, **look)
     shown = [*range(0, horizon, -(-max(horizon, 1) // _MOST_LABELS)), horizon]
     ax.set_yticks([*shown[:-1], top], [axis.label(row) for row in shown])
     ax.set(xlim=(-0.5, len(expected) - 0.5), ylim=(-0.5, top + 0.5), ylabel="expected at")
     style.tidy(ax).tick_params(labelbottom=False)
+    if trust is not None:
+        ax.tick_params(axis="y", length=0, pad=16)
 
 
 def _plot_rewards(ax: Axes, told: Story) -> None:

@@ -85,8 +85,7 @@ def _episode(explained: Explanation, told: Story) -> Figure:
         told,
         f"{agent.name}, the episode with seed {explained.seed}",
         trust=None if report is None else report.trust,
-        world=agent.world if isinstance(agent.world, Gridworld) else None,
-        table=agent.estimator if isinstance(agent.estimator, ExactTable) else None,
+        world=agent.world if isinstance(agent.world, Gridworld) and not agent.is_away else None,
     )
 
 

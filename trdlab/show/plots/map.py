@@ -17,7 +17,6 @@ from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.gridmap import MOVES
 from trdlab.gridworld.render import ABOVE_ROUTES, draw_map
-from trdlab.rollouts.episodes import Episode
 from trdlab.show.plots import bars, style
 from trdlab.show.plots.moment import (
     EXPECTED,
@@ -168,31 +167,6 @@ def route(table: ExactTable, state: int, action: int) -> list[int]:
         if ended:
             break
         action = int(policy[following].argmax())
-    return states
-
-
-def route_taken(table: ExactTable, episode: Episode) -> list[int] | None:
-    """Returns the states that an episode of a model went through; None if that cannot be told.
-
-    Episodes keep what was expected, not what was seen: of the states that an action can lead to,
-    that one is taken of which the same was expected.
-    """
-    mdp, components = table.mdp, table.decomposition.components
-    states = [mdp.start]
-    for step, action in enumerate(episode.actions):
-        row, is_last = states[-1] * mdp.num_actions + action, step + 1 == len(episode)
-        outcomes = np.arange(mdp.offsets[row], mdp.offsets[row + 1])
-        fits = (mdp.probabilities[outcomes] > 0.0) & (
-            mdp.terminated[outcomes] == (is_last and episode.terminated)
-        )
-        fits &= np.isclose(mdp.rewards[outcomes], episode.rewards[step])
-        following = np.unique(mdp.next_states[outcomes[fits]])
-        if not is_last:
-            seen = episode.decomposition.components[step + 1]  # [A, N+1]
-            following = following[(components[following] == seen).all(axis=(1, 2))]
-        if len(following) != 1:
-            return None
-        states.append(int(following[0]))
     return states
 
 

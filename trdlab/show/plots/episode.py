@@ -2,7 +2,7 @@
 
 from itertools import groupby, pairwise
 from textwrap import wrap
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -38,11 +38,7 @@ _MAP = 0.75  # of the height that a map has elsewhere
 
 @style.settings()
 def story_figure(
-    told: Story,
-    title: str = "",
-    *,
-    trust: Trust | None = None,
-    world: Gridworld | None = None,
+    told: Story, title: str = "", *, trust: Trust | None = None, world: Gridworld | None = None
 ) -> Figure:
     """Returns the picture of an episode; the sentence of each key moment stands below it.
 
@@ -72,9 +68,9 @@ def story_figure(
 
 
 def plot_actions(ax: Axes, played: Played) -> Axes:
-    """Draws the action of each step in its colour, by name where there is room.
+    """Draws the action of each step in its colour on `ax`, which is returned.
 
-    `ax` is returned.
+    Names stand where there is room.
     """
     actions, names, begin = played.episode.actions, played.action_names, 0
     colours, box = style.action_colours(names), {"fc": "white", "ec": "none", "alpha": 0.75}
@@ -94,18 +90,11 @@ def plot_actions(ax: Axes, played: Played) -> Axes:
 def plot_story(ax: Axes, below: Axes, told: Story, trust: Trust | None = None) -> Axes:
     """Draws what was expected at each step, the rewards that came, and the numbered key moments.
 
-    Above, a column is a step of the episode, and a row is how many steps ahead; the residual stands
-    apart on top. A reward that is expected at its right step runs down a diagonal until it comes.
-    Beside each row is the evidence for it; what has not proved better than a guess is pale.
-
-    Args:
-        ax: the axes of what was expected.
-        below: the axes of the rewards, with the same steps.
-        told: the story.
-        trust: how far such forecasts can be trusted, if that is known.
-
-    Returns:
-        `ax`; its images are in discounted reward, for a colour bar.
+    On `ax`, which is returned, a column is a step of the episode, and a row is how many steps
+    ahead; the residual stands apart on top. A reward that is expected at its right step runs down a
+    diagonal until it comes: on `below`, with the same steps. Beside each row is the evidence for
+    it; what has not proved better than a guess is pale. The images of `ax` are in discounted
+    reward, for a colour bar.
     """
     _plot_expected(ax, told, trust)
     _plot_rewards(below, told)
@@ -198,19 +187,17 @@ def _mark_ends(ax: Axes, below: Axes, told: Story) -> None:
 
 def _limits(expected: FloatArray) -> tuple[float, float]:
     """Returns the values `[T, N+1]` that the colours end at: those of the explicit components."""
-    values = expected[:, :-1] if expected.shape[1] > 1 else expected
-    largest = float(np.abs(values).max()) or float(np.abs(expected).max()) or 1.0
+    largest = float(np.abs(expected[:, :-1]).max(initial=0.0)) or float(np.abs(expected).max())
     has_costs = float(expected.min()) < -_HARDLY * largest
-    return (-largest if has_costs else 0.0), largest
+    return (-largest if has_costs else 0.0), largest or 1.0
 
 
-def _extend(expected: FloatArray) -> Literal["neither", "both", "min", "max"]:
+def _extend(expected: FloatArray) -> Any:
     """Returns at which ends of the colour bar the residual goes on."""
     low, high = _limits(expected)
-    below, above = expected[:, -1].min() < low - _HARDLY * high, expected[:, -1].max() > high
-    if below and above:
-        return "both"
-    return "min" if below else "max" if above else "neither"
+    ends = expected[:, -1].min() < low - _HARDLY * high, expected[:, -1].max() > high
+    names = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    return names.get(ends, "neither")
 
 
 def _residual_row(horizon: int) -> float:

@@ -1,6 +1,6 @@
 """What is expected of actions at one moment: bars, what they can be off by, and the difference."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,22 +25,32 @@ __all__ = ["moment_figure", "plot_action", "plot_components", "plot_contrast", "
 Range = tuple[float, float]
 """The least and the largest value that is possible."""
 ANY: Range = (-np.inf, np.inf)
-PANEL = 1.75
-"""Inches that one row of bars takes."""
-EXPECTED = "expected discounted reward"
+
+_PANEL = 1.75  # inches that one row of bars takes
 
 
 @style.settings()
 def moment_figure(
-    choice: Choice, title: str = "", *, trial: Trial | None = None, possible: Range = ANY
+    choice: Choice,
+    title: str = "",
+    *,
+    trial: Trial | None = None,
+    possible: Range = ANY,
+    above: tuple[float, Callable[[Axes], object]] | None = None,
 ) -> Figure:
-    """Returns the picture of an action, or of two and their difference (see `plot_moment`)."""
-    panels = 1 if choice.foil is None else 3
-    figure = style.new_figure(1.6 + PANEL * panels, title)
-    axes = np.atleast_1d(figure.subplots(panels, 1, sharex=True)).tolist()
+    """Returns the picture of an action, or of two and their difference (see `plot_moment`).
+
+    With `above`, something else is drawn at the top: how many inches it takes, and what draws it.
+    """
+    heights = [_PANEL] * (1 if choice.foil is None else 3)
+    heights[:0] = () if above is None else above[:1]
+    figure = style.new_figure(1.6 + sum(heights), title)
+    axes = np.atleast_1d(figure.subplots(len(heights), 1, height_ratios=heights)).tolist()
+    if above is not None:
+        above[1](axes.pop(0))
     plot_moment(axes, choice, trial=trial, possible=possible)
-    figure.supylabel(EXPECTED, fontsize=style.TEXT, color=style.MUTED)
-    explain_marks(figure, choice, trial)
+    axes[len(axes) // 2].set_ylabel("expected discounted reward")
+    _explain_marks(figure, choice, trial)
     return figure
 
 
@@ -114,7 +124,7 @@ def plot_contrast(
     return ax
 
 
-def explain_marks(figure: Figure, choice: Choice, trial: Trial | None = None) -> None:
+def _explain_marks(figure: Figure, choice: Choice, trial: Trial | None = None) -> None:
     """Adds a legend of the marks that are there, and says whose future it is."""
     moment, names = choice.moment, names_of(choice)
     handles: list[Artist] = [bars.residual_handle()]

@@ -57,7 +57,7 @@ def story_figure(
     ratios = [*[top] * bool(top), 0.3, 2.4, 0.9]
     *maps, strip, ax, below = figure.subplots(len(ratios), 1, height_ratios=ratios)
     if world is not None and states is not None:
-        plot_route(draw_map(maps[0], world, states[0]), world, states)
+        plot_route(draw_map(maps[0], world, states[0]), world, states.tolist())
     plot_actions(strip, played)
     plot_story(ax, below, told, trust)
     extend = _extend(played.episode.predicted)
@@ -99,7 +99,9 @@ def plot_story(ax: Axes, below: Axes, told: Story, trust: Trust | None = None) -
     _plot_expected(ax, told, trust)
     _plot_rewards(below, told)
     _mark_moments(ax, below, told)
-    _mark_ends(ax, below, told)
+    for panel in (ax, below):
+        for step in np.flatnonzero(told.played.episode.ends):  # nothing was left to come
+            panel.axvline(step + 0.5, color=style.INK, linewidth=1.2, zorder=3, clip_on=False)
     return ax
 
 
@@ -137,7 +139,7 @@ def _plot_expected(ax: Axes, told: Story, trust: Trust | None) -> None:
 
 
 def _plot_rewards(ax: Axes, told: Story) -> None:
-    rewards = told.played.episode.rewards
+    rewards, is_over = told.played.episode.rewards, told.played.episode.terminated
     at = np.flatnonzero(rewards)
     ax.vlines(at, 0.0, rewards[at], color=style.INK, linewidth=1.5 if at.size < 200 else 0.6)
     for marker, some in (("o", at[rewards[at] > 0.0]), ("v", at[rewards[at] < 0.0])):
@@ -151,7 +153,8 @@ def _plot_rewards(ax: Axes, told: Story) -> None:
     ax.set(xlim=(-0.5, len(rewards) - 0.5), ylabel="reward", xlabel="step of the episode")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
     ax.yaxis.set_major_locator(MaxNLocator(nbins=3))
-    style.tidy(ax)
+    how: Any = {"fontsize": style.TEXT, "color": style.MUTED, "pad": 2.0}
+    style.tidy(ax).set_title("ended" if is_over else "cut off", loc="right", **how)
 
 
 def _mark_moments(ax: Axes, below: Axes, told: Story) -> None:
@@ -173,16 +176,6 @@ def _mark_moments(ax: Axes, below: Axes, told: Story) -> None:
             text = ", ".join(str(number + 1) for number in range(start, stop))
             at = (float(np.mean(places[start:stop])), 1.0)
             style.note(ax, text, at, (0, 3), **how)
-
-
-def _mark_ends(ax: Axes, below: Axes, told: Story) -> None:
-    """Draws a line where nothing was left to come, and says how the episode ended."""
-    episode = told.played.episode
-    for step in np.flatnonzero(episode.ends):
-        for panel in (ax, below):
-            panel.axvline(step + 0.5, color=style.INK, linewidth=1.2, zorder=3, clip_on=False)
-    how: Any = {"fontsize": style.TEXT, "color": style.MUTED, "pad": 2.0}
-    below.set_title("ended" if episode.terminated else "cut off", loc="right", **how)
 
 
 def _limits(expected: FloatArray) -> tuple[float, float]:

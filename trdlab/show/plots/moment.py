@@ -22,8 +22,7 @@ from trdlab.time_axis import axis_title
 
 __all__ = ["moment_figure", "plot_action", "plot_components", "plot_contrast", "plot_moment"]
 
-Range = tuple[float, float]
-"""The least and the largest value that is possible."""
+Range = tuple[float, float]  # the least and the largest value that is possible
 ANY: Range = (-np.inf, np.inf)
 
 _PANEL = 1.75  # inches that one row of bars takes
@@ -74,10 +73,10 @@ def plot_moment(
         plot_action(ax, moment, name, scale=scale, possible=possible)
         _title(ax, f"{name}: Q = {style.told(value, decimals)}", moment.components(name))
     if choice.foil is not None:
-        plot_contrast(axes[-1], moment, choice.action, choice.foil, trial=trial)
-        delta = settled(moment.difference(choice.action, choice.foil))
+        plot_contrast(axes[-1], moment, *names, trial=trial)
+        delta = settled(moment.difference(*names))
         gap = style.told(float(delta.sum()), decimals_for([delta.sum()]))
-        _title(axes[-1], f"{choice.action} − {choice.foil}: {gap}", delta)
+        _title(axes[-1], f"{' − '.join(names)}: {gap}", delta)
     for ax in axes[:-1]:
         ax.tick_params(labelbottom=False)
     axes[-1].set_xlabel(style.STEPS)
@@ -183,9 +182,9 @@ def _title(ax: Axes, text: str, components: FloatArray) -> None:
 
 def _survival(moment: Moment, action: str) -> FloatArray:
     """Returns `[N+1]`: the chance that the episode still runs, 1 where it is not known."""
-    known = moment.uncertainty
-    ones = np.ones(moment.time_axis.num_components)
-    return ones if known is None else np.asarray(known.survival[moment.index(action)])
+    if moment.uncertainty is None:
+        return np.ones(moment.time_axis.num_components)
+    return np.asarray(moment.uncertainty.survival[moment.index(action)])
 
 
 def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:

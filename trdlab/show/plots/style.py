@@ -30,17 +30,12 @@ from trdlab.time_axis import TimeAxis
 
 Point = tuple[float, float]
 
-INK = "#16202c"
-"""What really came (rewards, routes, trials), whiskers, and text."""
-MUTED = "#5b6470"
-"""What explains the picture: axes, notes, the policy on a map, the chance to be still running."""
-EXPECTED, COST = "#1d3557", "#b3224a"
-"""Rewards and costs that are expected."""
-AGENTS = ("#4b2e83", "#b9a7dc")
-"""Two agents that are compared, the dark one first."""
+INK = "#16202c"  # what really came (rewards, routes, trials), whiskers, and text
+MUTED = "#5b6470"  # what explains: axes, notes, a policy on a map, the chance to be still running
+EXPECTED, COST = "#1d3557", "#b3224a"  # rewards and costs that are expected
+AGENTS = ("#4b2e83", "#b9a7dc")  # two that are compared, the dark one first
 EVIDENCE = {"good": "#dcecd8", "bad": "#f8d3cf", "open": "#ececec", "not tested": "#ececec"}
 """The ground that forecasts stand on: proved, disproved, and neither."""
-
 _MEANINGS = ("better than a guess", "no better than a guess", "open, or not tested")
 _ACTIONS = (  # those of Okabe and Ito come first, and go to the directions
     *("#0072b2", "#e69f00", "#009e73", "#cc79a7"),
@@ -48,12 +43,9 @@ _ACTIONS = (  # those of Okabe and Ito come first, and go to the directions
 )
 _DIRECTIONS = (("up", "north"), ("down", "south"), ("left", "west"), ("right", "east"))
 
-WIDTH = 6.0
-"""Inches: where it is shown 360 pixels wide, `TEXT` is 8 pixels high."""
-TEXT, TITLE = 10.0, 11.0
-"""Points; nothing is smaller."""
-LETTERS = 72
-"""How many letters of `TEXT` fit beside each other."""
+WIDTH = 6.0  # inches: where it is shown 360 pixels wide, `TEXT` is 8 pixels high
+TEXT, TITLE = 10.0, 11.0  # points; nothing is smaller
+LETTERS = 72  # of `TEXT` that fit beside each other
 STEPS = "steps from now (t: the action taken now)"
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 

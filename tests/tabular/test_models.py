@@ -485,3 +485,14 @@ def test_the_table_works_in_the_wrapper_and_in_explanations():
         choice = tabular_moment(table, state, world.action_names).choice()
         said = [claim.sentence for claim in told(choice)]
         assert len(check(" ".join(said), [(CHOICES, choice)])) == len(said) > 0
+
+
+def test_a_table_in_single_precision_is_accepted_and_said():
+    class Thirds(gym.Env):
+        P: ClassVar[Any] = [[[(np.float32(1 / 3), i, float(i), i == 2) for i in range(3)]]] * 3
+
+    world = tabular_world(Thirds())
+    (note,) = world.notes
+    assert note == "Probabilities come in single precision: 3 rows were divided by their sum."
+    assert exact(world.mdp, TimeAxis(0.5, 1)).solution.q_values[0, 0] == pytest.approx(1.5)
+    assert tabular_world(gym.make("Taxi-v4")).notes == ()

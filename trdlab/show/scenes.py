@@ -73,6 +73,7 @@ def _in_table(world: TabularWorld, state: int) -> Scene:
     told = {k: v for k, v in world.arguments.items() if isinstance(v, bool | str)}
     notes = [_NEVER] * (not world.visited[state] and not mdp.terminal_states[state])
     notes += [_LIMIT.format(world.time_limit)] * (world.time_limit is not None)
+    notes += world.notes
     names = [coordinate.name for coordinate in world.coordinates]
     return Scene(
         heading=f"{world.name} · {mdp.num_states} states, {mdp.num_actions} actions",

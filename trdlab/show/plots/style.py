@@ -9,7 +9,6 @@ their text can be read on a phone; they need no pyplot, and no backend of the us
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal
@@ -68,9 +67,21 @@ class Picture(Figure):
         with settings():
             super().draw(renderer)
 
+    def savefig(self, *args: Any, **options: Any) -> None:
+        """Saves it as any figure is, but laid out first: matplotlib draws twice for that."""
+        engine = self.get_layout_engine()
+        with settings():
+            if engine is not None:
+                engine.execute(self)
+            self.set_layout_engine(None)
+            try:
+                super().savefig(*args, **options)
+            finally:
+                self.set_layout_engine(engine)
+
     def _repr_png_(self) -> bytes:
         file = io.BytesIO()
-        self.savefig(file, format="png", dpi=_DPI)
+        self.savefig(file, format="png")
         return file.getvalue()
 
 
@@ -85,7 +96,7 @@ def settings() -> Iterator[None]:
 
 def new_figure(height: float, title: str = "") -> Picture:
     """Returns an empty picture of a height in inches; what is drawn in it is laid out by itself."""
-    figure = Picture(figsize=(WIDTH, height), layout="constrained")
+    figure = Picture(figsize=(WIDTH, height), dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
     if title:
         lines = -(-len(title) // 62)
@@ -128,8 +139,7 @@ def save(figure: Figure, path: Path) -> None:
     except OSError as error:
         cause = f"Cannot make the folder '{path.parent}': {error.strerror or error}."
         raise OutputError(cause, "Choose another folder.") from error
-    with settings():
-        write_whole(path, partial(figure.savefig, dpi=_DPI))
+    write_whole(path, figure.savefig)
 
 
 def action_colours(names: Sequence[str]) -> dict[str, str]:

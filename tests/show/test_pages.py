@@ -14,7 +14,7 @@ from trdlab.estimator import Future
 from trdlab.explanations import solve_gridworld, solve_tabular
 from trdlab.explanations.moment.telling import in_brief
 from trdlab.show.document import document
-from trdlab.show.text import plain_ascii, table_cells, text
+from trdlab.show.text import plain_ascii, text
 
 EVIL = "<script>alert('γ')</script>"
 
@@ -47,8 +47,8 @@ def numbers(page: str) -> list[str]:
 def test_a_narrow_page_is_wrapped_and_cuts_no_number(name, details, width):
     noun = nouns()[name]
     known = text(noun, width=500, details=details).plain
-    if (choice := getattr(noun, "choice", None)) is not None:  # a wide table may leave some out
-        known += "\n" + " ".join(cell for row in table_cells(choice) for cell in row)
+    if (table := document(noun).table) is not None:  # of which a wide page may leave some out
+        known += "\n" + " ".join(cell for row in (table.heading, *table.rows) for cell in row)
     page = text(noun, width=width, details=details).plain
     for line in page.splitlines():
         assert len(line) <= width or " " not in line.strip(), line  # a word is never broken

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 from array_api_compat import array_namespace
 
 from trdlab.errors import InputError
@@ -36,7 +37,8 @@ def target(reward: Array, discount: Array, next_components: Array) -> Array:
     >>> target(np.float64(1.0), np.float64(0.5), np.array([2.0, 4.0, 6.0]))
     array([1., 1., 5.])
     """
-    xp = array_namespace(next_components)
+    is_numpy = isinstance(next_components, np.ndarray)  # its own namespace is there already
+    xp = np if is_numpy else array_namespace(next_components)
     if next_components.ndim == 0 or next_components.shape[-1] == 0:
         raise InputError(
             f"next_components has shape {tuple(next_components.shape)}: it has no component.",

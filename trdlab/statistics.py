@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -152,11 +153,14 @@ def by_episode(sums: FloatArray, statistic: Statistic, *, seed: int = 0) -> Esti
     return percentiles(values, has_enough(sums))
 
 
+@lru_cache(maxsize=1)  # all that is asked of the same episodes is asked in a row
 def draws(count: int, seed: int) -> FloatArray:
     """Returns `[1 + R, E]`: how often each of E episodes counts, in the first row once each."""
     rng = np.random.default_rng(seed)
     drawn = rng.multinomial(count, np.full(count, 1.0 / count), size=RESAMPLES)
-    return np.concatenate([np.ones((1, count)), drawn])
+    found = np.concatenate([np.ones((1, count)), drawn])
+    found.setflags(write=False)
+    return found
 
 
 def pooled(drawn: FloatArray, sums: FloatArray) -> FloatArray:
@@ -192,6 +196,21 @@ def different_episodes(sums: FloatArray, among: BoolArray) -> IntArray:
     _, same = np.unique(sums.reshape(len(sums), -1), axis=0, return_inverse=True)
     of = np.eye(same.max() + 1, dtype=np.bool_)[same.ravel()]  # [E, different]
     return np.asarray((of.T.astype(np.int64) @ among.reshape(len(sums), -1) > 0).sum(axis=0))
+
+
+def effective(shares: FloatArray) -> FloatArray:
+    """Returns `[...]`: from how many episodes a sum comes, where a few can hold most of it.
+
+    Args:
+        shares: `[E, ...]`, not below 0, what each episode adds.
+
+    Source: Kish (1965), "Survey sampling", on the effective size of a weighted sample.
+
+    >>> effective(np.array([1.0, 1.0, 1.0, 0.0])).item(), effective(np.array([9.0, 1.0])).item()
+    (3.0, 1.2195121951219512)
+    """
+    total, squares = shares.sum(axis=0), (shares**2).sum(axis=0)
+    return np.asarray(total**2 / np.maximum(squares, np.finfo(np.float64).tiny))
 
 
 def has_enough(sums: FloatArray) -> bool:

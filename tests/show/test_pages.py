@@ -47,7 +47,7 @@ def numbers(page: str) -> list[str]:
 def test_a_narrow_page_is_wrapped_and_cuts_no_number(name, details, width):
     noun = nouns()[name]
     known = text(noun, width=500, details=details).plain
-    if (table := document(noun).table) is not None:  # of which a wide page may leave some out
+    if (table := document(noun).table) is not None:  # a wide table may leave some out
         known += "\n" + " ".join(cell for row in (table.heading, *table.rows) for cell in row)
     page = text(noun, width=width, details=details).plain
     for line in page.splitlines():

@@ -29,7 +29,7 @@ from trdlab.estimator import Future
 from trdlab.explanations import Explanation, explain, solve_gridworld, solve_tabular
 from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.moment.exact import tabular_moment
-from trdlab.explanations.moment.moment import Moment, Uncertainty
+from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty
 from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld, load_map, parse_map
 from trdlab.policies import Memoryless
@@ -143,7 +143,7 @@ def test_a_whisker_much_longer_than_the_bars_is_cut_off_and_says_where_it_ends()
 
 def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
     found = moment([[1.0, 0.9, 94.5], [1.0, -0.8, 2.0]], TimeAxis(0.95, 2))
-    action, foil, contrast = moment_figure(found, "go", "stay").axes
+    action, foil, contrast = moment_figure(Choice(found, "go", "stay")).axes
     assert action.get_ylim() == foil.get_ylim()
     assert heights(action) == [1.0, 0.9, 1.5]
     assert heights(foil) == [1.0, -0.8, 1.5]
@@ -170,7 +170,7 @@ def test_what_lies_within_the_proven_error_is_zero():
     table = exact(world.mdp, TimeAxis(0.95, 4))
     found = tabular_moment(table, 0, world.action_names)
     settled = without_noise(found, float(table.solution.error_bound[0].max()))
-    for ax in moment_figure(settled, "up", "left").axes:
+    for ax in moment_figure(Choice(settled, "up", "left")).axes:
         assert heights(ax) == [0.0] * 5
         assert not whisker_ends(ax)
 
@@ -209,7 +209,7 @@ def test_an_action_has_one_colour_whatever_part_it_plays():
         "stay": action_colours(["go", "stay"])["stay"],
     }
     for action, foil in (("go", "stay"), ("stay", "go")):
-        first, second, contrast = moment_figure(LEARNED, action, foil).axes
+        first, second, contrast = moment_figure(Choice(LEARNED, action, foil)).axes
         assert {to_hex(bar.get_edgecolor()) for bar in bars(first)} == {colours[action]}
         assert {to_hex(bar.get_edgecolor()) for bar in bars(second)} == {colours[foil]}
         pairs = zip(bars(contrast), heights(contrast), strict=True)
@@ -225,7 +225,7 @@ def test_a_route_has_the_colour_of_its_action_and_directions_the_same_in_every_w
     table = solved()["drone"].table
     world = Gridworld(load_map("drone"))
     for action, foil in (("up", "down"), ("down", "up")):
-        ax = plot_map(Figure().subplots(), world, table, 0, action, foil)
+        ax = plot_map(Figure().subplots(), world, table, 0, (action, foil))
         assert [to_hex(line.get_color()) for line in ax.lines] == [colours[action], colours[foil]]
     lake = action_colours(("left", "down", "right", "up"))
     taxi = action_colours(("south", "north", "east", "west", "pickup", "dropoff"))
@@ -238,7 +238,7 @@ def test_what_is_bad_and_what_is_not_tested_stand_on_different_ground():
     trust = Trust(AXIS, ("good", "bad", "open", "good"))
     of_foils = Trust(AXIS, ("good", "good", "good", "not tested"))
     judged = replace(LEARNED, trust=trust, foil_trust=of_foils, policy=np.array([1.0, 0.0]))
-    figure = moment_figure(judged, "go", "stay")
+    figure = moment_figure(Choice(judged, "go", "stay"))
     grounds = [
         [to_hex(patch.get_facecolor()) for patch in ax.patches if patch not in bars(ax)]
         for ax in figure.axes
@@ -307,7 +307,7 @@ def test_the_line_of_those_still_running_is_explained():
 def test_a_route_stops_before_the_treasure_that_it_leads_to():
     bridge = solved()["bridge"]
     assert isinstance(bridge.world, Gridworld)
-    ax = plot_map(Figure().subplots(), bridge.world, bridge.table, 0, "down", "left")
+    ax = plot_map(Figure().subplots(), bridge.world, bridge.table, 0, ("down", "left"))
     for line in ax.lines:
         x, y = (values[-1] for values in line.get_data())
         assert 6 < x < 7

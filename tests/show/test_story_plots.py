@@ -60,8 +60,7 @@ def test_the_columns_are_steps_the_rows_are_steps_ahead_and_costs_have_a_colour(
 
 def test_moments_are_numbered_as_their_sentences_are():
     told = tell(played(500, TimeAxis(0.95, 40)))
-    captions = ["It happened."] * len(told.moments)
-    figure = story_figure(told, "an episode", captions=captions)
+    figure = story_figure(told, "an episode")
     marks = [text.get_text() for text in figure.axes[1].texts]
     assert ", ".join(marks) == ", ".join(str(i + 1) for i in range(len(told.moments)))
     lines = figure.legends[0].get_title().get_text().splitlines()

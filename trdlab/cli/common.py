@@ -131,12 +131,15 @@ def publish(
         if hint := further(thing):
             print_line(f"Try: {hint}", "dim")
     if plot is not None:
-        from trdlab.show.plots.style import save
+        save_picture(thing.plot(), plot)
 
-        save(thing.plot(), plot)
-        Console(stderr=True, highlight=False).print(
-            f"Picture: {plot}", soft_wrap=True, markup=False
-        )
+
+def save_picture(figure: Any, path: Path) -> None:
+    """Writes a picture, and says where it is."""
+    from trdlab.show.plots.style import save
+
+    save(figure, path)
+    Console(stderr=True, highlight=False).print(f"Picture: {path}", soft_wrap=True, markup=False)
 
 
 def command(words: Sequence[str | float], options: Mapping[str, str | float | None]) -> str:

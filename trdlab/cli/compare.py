@@ -93,11 +93,7 @@ def compare(
         if hint := _further(found):
             common.print_line(f"Try: {hint}", "dim")
     if out is not None:
-        from trdlab.show.plots.comparison import comparison_figure
-        from trdlab.show.plots.style import save
-
-        save(comparison_figure(found), path)
-        errors.print(f"Picture: {path}", soft_wrap=True, markup=False)
+        common.save_picture(found.plot(), path)
 
 
 def _further(found: "Comparison") -> str:

@@ -97,9 +97,11 @@ def explain(
 
         out = free_name(Path("explanations"), found.name)
     if out is not None:
-        from trdlab.show.plots.figures import picture_paths
+        from trdlab.show.plots.figures import part_figure, picture_paths
+        from trdlab.show.plots.style import check_pictures
 
         paths = picture_paths(out, parts, seed=seed, step=step)
+        check_pictures(paths.values())
     errors = Console(stderr=True, highlight=False)
     with EpisodeProgress(errors, "Getting ready") as progress:
         explained = explain_agent(
@@ -118,7 +120,6 @@ def explain(
     else:
         common.print_page(explained, details=details)
     if out is not None:
-        from trdlab.show.plots.figures import write_pictures
-
-        for path in write_pictures(explained, paths):
-            errors.print(f"Picture: {path}", soft_wrap=True, markup=False)
+        for part, path in paths.items():
+            if (figure := part_figure(explained, part)) is not None:
+                common.save_picture(figure, path)

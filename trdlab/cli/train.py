@@ -185,11 +185,9 @@ def runs(
         return
     common.print_text(runs_page(found))
     if plot is not None:
-        from trdlab.show.plots.style import save
         from trdlab.show.plots.training import curves_figure
 
-        save(curves_figure([run.path for run in found if run.fault is None]), plot)
-        _say(_errors(), f"Picture: {plot}")
+        common.save_picture(curves_figure([run.path for run in found if run.fault is None]), plot)
 
 
 def _train(

@@ -11,8 +11,7 @@ from trdlab.decomposition import RewardDecomposition
 from trdlab.environments import NotCopyable, NotParallel
 from trdlab.errors import InputError
 from trdlab.explanations.calibration.calibration import Calibration
-from trdlab.explanations.calibration.report import CalibrationReport, judge
-from trdlab.explanations.calibration.score import score_of
+from trdlab.explanations.calibration.report import CalibrationReport, judge, score_of
 from trdlab.explanations.moment.exact import exact_moment
 from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.outcome import Trial

@@ -134,6 +134,23 @@ class Language(Generic[E]):
 
         return made
 
+    def kinds(
+        self, says: Mapping[str, str]
+    ) -> Callable[[Callable[[E], Iterable[tuple[str, Fields]]]], tuple[Rule[E], ...]]:
+        """Makes rules of a function that finds claims of several kinds: each kind and its numbers.
+
+        Args:
+            says: of each kind its sentence.
+        """
+
+        def made(find: Callable[[E], Iterable[tuple[str, Fields]]]) -> tuple[Rule[E], ...]:
+            def of(kind: str) -> Callable[[E], list[Fields]]:
+                return lambda evidence: [found for own, found in find(evidence) if own == kind]
+
+            return tuple(self.rule(text, kind=kind)(of(kind)) for kind, text in says.items())
+
+        return made
+
     def say(self, claim: Claim) -> str:
         """Returns a claim as a sentence, its numbers with as many digits as tell them apart."""
         forms, fields, says = self.forms(claim.evidence), claim.fields, claim.rule.says

@@ -56,14 +56,7 @@ class Counterfactual:
 def try_actions(
     branching: Branching, playing: Playing, action: int, foil: int, *, seed: int = 0
 ) -> tuple[Branches, Branches]:
-    """Returns what follows two actions, each from copies of the same state.
-
-    Args:
-        branching: the estimator, and how many copies to make.
-        playing: where the state is: that of the first episode.
-        action: the number of one action.
-        foil: the number of the other.
-        seed: of the copies.
+    """Returns what follows two actions, each tried from copies of where the first episode stands.
 
     Raises:
         InputError: there is no such action, or both are the same.
@@ -80,9 +73,9 @@ def compared(
 ) -> Counterfactual:
     """Returns how two actions differ that were tried.
 
-    Nothing can come that is less, or more, than what was ever seen or is predicted. Where all
-    copies of each brought the same, and not always nothing, there is no chance, unless copies went
-    differently elsewhere.
+    Nothing can come that is less, or more, than what was ever seen, at any step, or is predicted.
+    Where all copies of each brought the same, and not always nothing, there is no chance, unless
+    copies went differently elsewhere.
 
     Args:
         tried: what followed the one and the other.
@@ -92,17 +85,15 @@ def compared(
     whole = all(bool(branches.known[0, -1]) for branches in tried)
     one, other = (_futures(branches, whole) for branches in tried)  # [n, N+2]
     said = np.stack([_with_sum(branches.predicted[0], whole) for branches in tried])  # [2, N+2]
-    everything = np.concatenate([one, other, said, *([] if seen is None else [seen.range])])
     same = not any(np.nan_to_num(np.ptp(of, axis=0)).any() for of in (one, other))
     chance = any(branches.shared_chance for branches in tried) or (seen and seen.chance)
     if same and (chance is False or (chance is None and np.nan_to_num(one + other).any())):
         value = one.mean(axis=0) - other.mean(axis=0)
         observed = Estimates(value, value, value)
     else:
-        rng = np.random.default_rng(seed)
-        observed = mean_difference(
-            one, other, everything.min(axis=0), everything.max(axis=0), rng=rng
-        )
+        came = np.concatenate([one, other, *([] if seen is None else [seen.range])])
+        ends = _extremes(tried[0].time_axis, came, said)
+        observed = mean_difference(one, other, *ends, rng=np.random.default_rng(seed))
     return Counterfactual(
         time_axis=tried[0].time_axis,
         action=int(tried[0].actions[0]),
@@ -113,6 +104,21 @@ def compared(
         observed=observed,
         same_every_time=same,
     )
+
+
+def _extremes(axis: TimeAxis, came: FloatArray, said: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Returns `[N+2]` twice: the least and the most that can come of each component, and in all.
+
+    What was paid at one explicit component could be paid at any, by its own discount.
+    """
+    rows = np.concatenate([came, said])
+    least, most = rows.min(axis=0), rows.max(axis=0)
+    discounts = np.maximum(axis.discounts, np.finfo(np.float64).tiny)  # [N+1]
+    paid = came[:, : axis.horizon] / discounts[:-1]
+    if np.isfinite(paid).any():
+        least[:-1] = np.minimum(least[:-1], np.nanmin(paid) * discounts)
+        most[:-1] = np.maximum(most[:-1], np.nanmax(paid) * discounts)
+    return least, most
 
 
 def _apart(one: FloatArray, other: FloatArray) -> FloatArray:

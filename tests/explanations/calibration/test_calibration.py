@@ -16,13 +16,14 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations.calibration.calibration import Calibration, calibrate
 from trdlab.explanations.calibration.errors import errors_of, is_off
+from trdlab.explanations.calibration.report import score_of
 from trdlab.explanations.calibration.residual import residual_of
-from trdlab.explanations.calibration.score import score_of
 from trdlab.explanations.calibration.trust import trust
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
 from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import pool, what_followed
+from trdlab.statistics import unseen
 from trdlab.tabular import ExactTable, exact
 from trdlab.tabular.episodes import ModelEnvironments
 
@@ -270,6 +271,18 @@ def test_rewards_that_never_come_and_are_not_expected_are_no_evidence():
     assert constant(0.0, 1.0).status[:3] == ("bad",) * 3, "a reward that was expected all the time"
 
 
+def test_what_differs_in_few_episodes_is_open_and_it_is_said_how_many_would_tell():
+    axis = TimeAxis(0.5, 1)
+    expected = [[[0.2 + 1e-3 * i, 0.0]] * 2 for i in range(20)]
+    episodes = [episode([float(i < 2)], axis, expected[i]) for i in range(20)]
+    found = calibrate(episodes)
+    assert found.skill.value[0] < 0.0
+    assert found.status[0] == "open"
+    # o² is 0.81 in two episodes and 0.01 in 18: in size like (1.8)² / 1.314 ≈ 2.5, and 10 would do
+    assert found.enough[0] == 90
+    assert found.bias.high[0] - found.bias.value[0] > unseen(20)
+
+
 def test_before_a_reward_that_comes_it_is_right_to_expect_none():
     axis = TimeAxis(0.5, 4)
     rows = [axis.discounts * np.eye(5)[2] * (t == 0) for t in range(4)]  # 1 in two steps, at first
@@ -380,4 +393,4 @@ def test_the_horizon_that_suffices_is_read_off_the_rewards():
     tails = exact_tails(table, occupancy(table), 60)
     assert found.observed_tails[:15] == pytest.approx(tails[:15], abs=0.03)
     least = int(np.flatnonzero(tails <= 0.05)[0])
-    assert found.sufficient() in (least - 1, least, least + 1)
+    assert found.sufficient in (least - 1, least, least + 1)

@@ -31,10 +31,10 @@ def bridge() -> ExactTable:
     return exact(Gridworld(load_map("bridge")).mdp, AXIS)
 
 
-def inside(found: Estimates, true: FloatArray) -> float:
-    """Returns the share of the known intervals that hold the truth."""
+def inside(found: Estimates, true: FloatArray) -> FloatArray:
+    """Returns which of the known intervals hold the truth."""
     told = ~np.isnan(found.low)
-    return float(((found.low <= true + 1e-9) & (true - 1e-9 <= found.high))[told].mean())
+    return ((found.low <= true + 1e-9) & (true - 1e-9 <= found.high))[told].astype(np.float64)
 
 
 def test_model_environments_draw_from_the_model_and_are_restored_to_the_bit():
@@ -62,15 +62,21 @@ def test_the_ceiling_of_an_exact_model_is_found_from_copies():
     branches = Branching(bridge(), copies=6, steps=300).along(environments, every=3)
     found = ceiling_of(branches)
     true = exact_ceiling(bridge(), occupancy(bridge()))
-    assert inside(found.skill, true) >= 0.8
+    assert inside(found.skill, true).mean() >= 0.8
     assert np.abs(found.skill.value - true).max() < 0.06
     assert not found.deterministic
-    assert found.copies == 6
 
 
 def test_an_exact_table_has_the_skill_of_the_ceiling():
     found = calibrate(collect(bridge(), ModelEnvironments(bridge().mdp, 300, seed=2)))
-    assert inside(found.skill, exact_ceiling(bridge(), occupancy(bridge()))) >= 0.85
+    assert inside(found.skill, exact_ceiling(bridge(), occupancy(bridge()))).mean() >= 0.85
+
+
+def test_what_came_in_few_episodes_speaks_against_no_forecast():
+    table = exact(DRONE.mdp, AXIS)  # which is right, also of what comes in one episode of a hundred
+    for seed in range(40):
+        found = calibrate(collect(table, ModelEnvironments(DRONE.mdp, 50, seed=seed)))
+        assert "bad" not in found.status
 
 
 def test_where_a_coin_decides_the_ceiling_is_zero():
@@ -117,13 +123,16 @@ def test_without_chance_the_ceiling_says_so():
 
 
 def test_foils_of_an_exact_table_are_predicted_without_bias():
-    environments = ModelEnvironments(DRONE.mdp, 200, seed=0)
-    table = exact(DRONE.mdp, AXIS)
-    branches = Branching(table, copies=4, steps=300).along(environments, every=2, foils=True)
-    assert set(branches.actions.tolist()) == {0, 1, 2, 3}
-    found = calibrate(branches.samples)
-    assert inside(found.bias, np.zeros(13)) >= 0.8
-    assert found.skill.low[1] > 0.2
+    branching, covered = Branching(exact(DRONE.mdp, AXIS), copies=4, steps=300), []
+    for seed in range(20):
+        environments = ModelEnvironments(DRONE.mdp, 200, seed=seed)
+        branches = branching.along(environments, every=2, foils=True, seed=seed)
+        assert set(branches.actions.tolist()) == {0, 1, 2, 3}
+        found = calibrate(branches.samples)
+        covered.append(inside(found.bias, np.zeros(13)))
+        assert found.skill.low[1] > 0.2
+    assert np.mean(covered) >= 0.9
+    assert np.mean(covered, axis=0).min() >= 0.75
 
 
 def test_a_counterfactual_contrast_agrees_with_the_exact_one():
@@ -132,13 +141,14 @@ def test_a_counterfactual_contrast_agrees_with_the_exact_one():
     playing = Recording(table, environments).playing
     branching = Branching(table, copies=200, steps=400)
     true = (table.decomposition[0, 1] - table.decomposition[0, 0]).components
-    shares = []
-    for seed in range(5):
+    covered = []
+    for seed in range(40):
         found = compared(try_actions(branching, playing, 1, 0, seed=seed), seed=seed)
         assert found.predicted == pytest.approx([*true, true.sum()])
         assert np.abs(found.observed.value - found.predicted).max() < 0.4
-        shares.append(inside(found.observed, found.predicted))
-    assert np.mean(shares) >= 0.85
+        covered.append(inside(found.observed, found.predicted))
+    # that holds of what is rare, too, which comes in few of these tries or in none
+    assert np.mean(covered, axis=0).min() >= 0.85
 
 
 def test_counterfactuals_refuse_what_is_not_there():

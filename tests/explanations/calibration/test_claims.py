@@ -20,16 +20,17 @@ from trdlab.explanations.calibration.claims import in_brief, sections, to_dict, 
 from trdlab.explanations.calibration.consistency import Consistency
 from trdlab.explanations.calibration.errors import Errors
 from trdlab.explanations.calibration.faults import REPORTS
-from trdlab.explanations.calibration.report import CalibrationReport, judge
+from trdlab.explanations.calibration.report import CalibrationReport, Score, judge, score_of
 from trdlab.explanations.calibration.residual import Residual
-from trdlab.explanations.calibration.score import Score, score_of
 from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check
 from trdlab.gridworld import Gridworld, load_map
+from trdlab.policies import Memoryless
 from trdlab.rollouts.branches import Branching
 from trdlab.rollouts.episodes import collect
 from trdlab.show.plots.calibration import plot_trust
 from trdlab.statistics import Estimate, Estimates
 from trdlab.tabular import exact
+from trdlab.tabular.episodes import ModelEnvironments
 
 WORDS = {
     "better": "worse",
@@ -167,9 +168,9 @@ def reports(draw: st.DrawFn) -> CalibrationReport:
             Estimate(1.0 - share, 0.0, 1.0),
             0.9 ** np.arange(draw(st.sampled_from([0, 60]))),
         ),
-        errors=Errors(axis, shift, 1.0, amount, estimate()) if axis.horizon > 1 else None,
+        errors=Errors(shift, amount, estimate()) if axis.horizon > 1 else None,
         consistency=consistency if axis.horizon else None,
-        ceiling=draw(st.sampled_from([None, Ceiling(axis, limits, 50, 4, draw(st.booleans()))])),
+        ceiling=draw(st.sampled_from([None, Ceiling(limits, 50, draw(st.booleans()))])),
         foils=draw(st.sampled_from([None, calibration()])),
         scale=116.0,
         chance=draw(st.booleans()),
@@ -237,16 +238,19 @@ def test_the_first_sentences_say_how_it_does_how_far_to_trust_it_and_what_is_wro
     components[..., 8:] = np.random.default_rng(0).normal(size=components[..., 8:].shape)
     worse = replace(table, decomposition=RewardDecomposition(components, axis))
     play = ModelEnvironments(mdp, 40, seed=0, time_limit=60)
-    episodes = collect(worse, play, policy=lambda states: table.solution.policy[states])
+    episodes = collect(worse, play, policy=Memoryless(lambda states: table.solution.policy[states]))
     report = judge(table.future, episodes)
     score, trust, wrong = in_brief(report)
-    assert score.sentence == "It scored 3.45 (3.3 to 3.6) an episode, on average over 40 episodes."
+    assert score.sentence == (
+        "It scored 3.45 an episode on average over 40 episodes; the true average is likely 3.3 to "
+        "3.6."
+    )
     assert trust.sentence == (
-        "Its forecasts are better than a guess about what comes within 8 steps."
+        "Its forecasts are better than a guess about what comes in the first 8 steps."
     )
     assert wrong.kind == "underestimates"
     assert verdicts(report)[1].sentence == (
-        "Its forecasts are no better than a guess about what comes in 8 to 11 steps."
+        "Its forecasts are no better than a guess about what comes 8 to 11 steps later."
     )
     assert to_dict(report)["trusted"]["last_step"] == 7
 
@@ -262,11 +266,11 @@ def test_good_bad_and_not_tested_are_three_things():
     report = judge(Future("a policy"), [one(i) for i in range(50)])  # type: ignore[misc]
     assert report.trust.status == ("good", "bad", "bad", "not tested")
     assert [claim.sentence for claim in verdicts(report)] == [
-        "Its forecasts are right about what comes now: it was the same every time.",
-        "Its forecasts are wrong about what comes in 1 to 2 steps: 0.1 on average, where 0.75 came "
-        "every time.",
-        "Its forecasts about what comes in 3 steps or later were not tested: episodes were cut off "
-        "before.",
+        "Its forecasts are right about what comes at once: it was the same every time.",
+        "Its forecasts are wrong about what comes 1 to 2 steps later: 0.1 on average, where 0.75 "
+        "came every time.",
+        "Its forecasts about what comes after the first 3 steps were not tested: episodes were cut "
+        "off before.",
     ]
 
 
@@ -296,6 +300,15 @@ def test_more_than_can_come_is_an_overestimate():
     )
 
 
+def test_one_episode_without_a_reward_does_not_tell_that_none_can_come():
+    axis = TimeAxis(0.9, 1)
+    rows = [[0.0, 0.3]] * 31
+    alone = judge(Future("a policy"), [episode([0.0] * 30, axis, rows)])
+    many = [episode([0.0] * length, axis, rows[: length + 1]) for length in range(10, 30)]
+    kinds = [[claim.kind for claim in told(of)] for of in (alone, judge(alone.future, many))]
+    assert ["overestimates" in of for of in kinds] == [False, True]
+
+
 def test_chance_that_copies_share_is_told_by_the_episodes():
     report = next(r for r in real() if r.ceiling is not None and r.ceiling.deterministic)
     assert not report.chance
@@ -313,7 +326,7 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
         check("Trust me.", [(REPORTS, real()[0])])
     with pytest.raises(UnsupportedSentenceError, match="is not true of"):
         check(
-            "Its forecasts are better than a guess about what comes within 2 steps.",
+            "Its forecasts are better than a guess about what comes in the first 2 steps.",
             [(REPORTS, real()[0])],
         )
 

@@ -16,7 +16,6 @@ from trdlab.estimator import Future
 from trdlab.explanations.calibration.consistency import Consistency, consistency_of
 from trdlab.explanations.calibration.faults import (
     amount_off,
-    discount_exponent,
     faults,
     is_discount_wrong,
     off_from,
@@ -183,9 +182,9 @@ def test_a_young_agent_expects_too_little_and_nothing_too_early(horizon, lengths
 def test_what_a_young_agent_is_told():
     report = young(8, (10, 10), 0.01, 0)
     late, share = (*off_from(report), *amount_off(report))
-    assert late.sentence.startswith("It expects too little of what comes in 3 to 7 steps: ")
+    assert late.sentence.startswith("It expects too little of what comes 3 to 7 steps later: ")
     assert late.sentence.endswith(" on average, where 1.56 came.")
-    assert share.sentence == "Within 8 steps it expects 61 % of what comes."
+    assert share.sentence == "In the first 8 steps it expects 61 % of what comes."
 
 
 # ---- steps that fit each other -------------------------------------------------------------------
@@ -222,5 +221,5 @@ def test_pairs_leave_out_what_random_actions_and_truncations_hide():
 
 def test_an_audit_that_says_nothing_names_nothing():
     silent: Consistency = consistency_of([predicted([[0.0, 0.0]] * 4, TimeAxis(0.5, 1))] * 12)
-    assert np.isnan(discount_exponent(silent).value)
+    assert np.isnan(silent.discount.value)
     assert not is_discount_wrong(silent)

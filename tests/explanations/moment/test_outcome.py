@@ -102,18 +102,18 @@ def test_what_came_on_the_ledge_agrees_with_the_exact_values():
     assert in_all.startswith(
         "Trying each 500 times was too few to tell whether right is worth more than up; about "
     )
-    assert now.startswith("As forecast, right paid 0.6")
-    assert now.endswith("more than up in 2 steps; 0.658 was forecast.")
-    assert later.startswith("As forecast, up paid 0.")
-    assert later.endswith("more than right in 3 steps; 0.5 was forecast.")
+    assert now.startswith("As forecast, 2 steps later right paid 0.6")
+    assert now.endswith("more than up; 0.658 was forecast.")
+    assert later.startswith("As forecast, 3 steps later up paid 0.")
+    assert later.endswith("more than right; 0.5 was forecast.")
     assert often == "Right and up were each tried 500 times from here."
 
 
 def test_without_chance_it_says_so_and_gives_no_interval():
     trial = try_out(gridworld_agent("drone", AXIS), "down", "up", copies=3)
     assert [claim.sentence for claim in told(trial)] == [
-        "As forecast, down was worth 0.266 more than up; 0.266 was forecast.",
-        "As forecast, down paid 0.95 more than up in 1 step; 0.95 was forecast.",
+        "As forecast, down was worth 0.266 more than up.",
+        "As forecast, 1 step later down paid 0.95 more than up.",
         "Down and up were each tried 3 times from here, and each brought the same every time.",
     ]
 
@@ -157,15 +157,15 @@ def test_a_false_promise_is_found_out():
     trial = try_out(agent, "right", "up", copies=100)
     false = next(claim for claim in told(trial) if claim.kind == "against-the-forecast")
     assert (false.more, false.less, false.component) == ("up", "right", 2)
-    assert false.sentence.startswith("Against the forecast, right paid 0.6")
-    assert false.sentence.endswith("more than up in 2 steps; up was to be 1.34 ahead.")
+    assert false.sentence.startswith("Against the forecast, 2 steps later right paid 0.6")
+    assert false.sentence.endswith("more than up; up was to be 1.34 ahead.")
 
 
 def test_less_than_was_promised_is_found_out_too():
     agent = changed(gridworld_agent("ledge", AXIS), action=3, component=2, by=2.0)
     trial = try_out(agent, "right", "up", copies=100)
     (claim,) = (claim for claim in told(trial) if claim.kind == "by-another-amount")
-    assert claim.sentence.endswith("more than up in 2 steps, less than the 2.66 that was forecast.")
+    assert claim.sentence.endswith("more than up, less than the 2.66 that was forecast.")
 
 
 def test_foils_are_judged_beside_what_the_agent_does():

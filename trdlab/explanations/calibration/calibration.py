@@ -8,7 +8,6 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
-from trdlab.explanations.calibration.reliability import Reliability, reliability_of
 from trdlab.rollouts.episodes import Episode
 from trdlab.rollouts.realised import Samples, pool
 from trdlab.statistics import (
@@ -17,6 +16,7 @@ from trdlab.statistics import (
     Estimates,
     by_episode,
     different_episodes,
+    effective,
     enough,
     unseen,
 )
@@ -24,6 +24,8 @@ from trdlab.statistics import (
 Status = Literal["good", "bad", "open", "not tested"]
 SLACK = 0.1
 """How wrong a forecast may be where the reward was always the same, as a share of it."""
+NUM_BINS = 10
+"""Of the chances in a `Reliability`."""
 
 _ROUNDING = 1e-12  # relative; rewards that differ by less are the same reward
 
@@ -38,15 +40,17 @@ class Calibration:
     Args:
         time_axis: what the components mean.
         status: N+1 of them. `good`: surely better than a constant guess, or right where the reward
-            was always the same. `bad`: surely no better, or wrong there by more than could be put
-            down to what is too rare to be seen. `open`: too few episodes tell. `not tested`: no
-            reward came then or later, nor was expected, or nothing is known of what came.
+            was always the same. `bad`: surely no better, or wrong there; but where hardly any
+            episode differs, only if wrong by more than could be put down to what is too rare to be
+            seen. `open`: too few episodes tell. `not tested`: no reward came then or later, nor was
+            expected, or nothing is known of what came.
         constant: `[N+1]`, whether what was observed was always the same; then there is no skill.
         num_samples: `[N+1]`, the steps of which it is known what followed.
         num_episodes: `[N+1]`, the different episodes that these are from.
         enough: N+1 times, about how many different episodes would tell, where too few do; None
             where nobody can say.
-        bias: `[N+1]`, the mean of predicted − observed.
+        bias: `[N+1]`, the mean of predicted − observed; where hardly any episode differs its
+            interval is as much wider as what is too rare to be seen could make it.
         error: `[N+1]`, the mean of (predicted − observed)².
         mean: `[N+1]`, of what was observed.
         variance: `[N+1]`, of what was observed: the error of the best constant prediction.
@@ -72,7 +76,7 @@ class Calibration:
     skill: Estimates
     predicted_range: FloatArray
     observed_range: FloatArray
-    reliability: Reliability | None
+    reliability: "Reliability | None"
 
     def is_(self, status: Status) -> BoolArray:
         """Returns `[N+1]`: the components of a status."""
@@ -90,39 +94,50 @@ def calibrate(episodes: Sequence[Episode] | Samples, *, seed: int = 0) -> Calibr
         InputError: there are no episodes, or they are of different time axes.
     """
     samples = episodes if isinstance(episodes, Samples) else pool(episodes)
-    sums, constant = _sums(samples)
-    estimates = by_episode(sums, _statistics, seed=seed)
+    axis, known, observed = samples.time_axis, samples.known, samples.observed
+    num_samples = known.sum(axis=0)
+    seen = num_samples > 0
+    mean = np.where(seen, observed.sum(axis=0) / np.maximum(num_samples, 1), np.nan)
+    o = np.where(known, observed - mean, 0.0)  # so that squares do not swallow what is small
+    e = np.where(known, samples.predicted - observed, 0.0)
+    parts = (known.astype(np.float64), e, e * e, o, o * o)
+    sums = np.stack([samples.per_episode(part) for part in parts], axis=1)  # [E, 5, N+1]
+    varies = np.abs(o).max(axis=0) > _ROUNDING * np.abs(observed).max(axis=0)
+    constant = seen & ~varies
+
     num_episodes = different_episodes(sums, sums[:, 0] > 0)
-    num_samples = samples.known.sum(axis=0)
-    seen, many = num_samples > 0, num_episodes >= FEWEST_EPISODES
-    bias, error, skill = (
-        Estimates(estimates.value[i], estimates.low[i], estimates.high[i]).where(
-            shown, shown & many
-        )
-        for i, shown in enumerate((seen, seen, seen & ~constant))
-    )
-    mean = np.where(seen, samples.observed.sum(axis=0) / np.maximum(num_samples, 1), np.nan)
-    ranges = [_range(samples, of) for of in (samples.predicted, samples.observed)]
-    missed = _could_be_missed(samples.time_axis, num_episodes, ranges)
-    variance = _variance(*sums[:, [0, 3, 4]].sum(axis=0))
-    right = error.value <= _allowed(samples.time_axis, mean, np.where(constant, np.nan, variance))
+    telling = np.minimum(num_episodes, effective(sums[:, 4]) * varies)
+    rare = telling < FEWEST_EPISODES
+    ranges = [_range(of) for of in (samples.predicted, observed)]
+    missed = _could_be_missed(axis, num_episodes, ranges)
+
+    shown = np.stack([seen, seen, varies, seen])
+    found = by_episode(sums, _statistics, seed=seed)  # [4, N+1]
+    found = found.where(shown, shown & (num_episodes >= FEWEST_EPISODES))
+    wider = np.eye(4)[0][:, None] * np.where(rare, missed, 0.0)  # of the bias alone
+    ends = zip(found.value, found.low - wider, found.high + wider, strict=True)
+    bias, error, skill, variance = (Estimates(*of) for of in ends)
+
+    right = error.value <= _allowed(axis, mean, np.where(varies, variance.value, np.nan))
     wrong = np.abs(bias.value) > missed
+    untested = ~seen | (constant & ~_pays(mean) & ~wrong)
+    is_good = np.where(constant, right, skill.low > 0.0)
+    is_bad = (constant & wrong) | ((skill.high <= 0.0) & (wrong | ~rare))
+    status = np.select([untested, is_good, is_bad], ["not tested", "good", "bad"], "open")
     return Calibration(
-        time_axis=samples.time_axis,
-        status=tuple(
-            map(_status, seen, constant, _pays(mean), right, wrong, skill.low, skill.high)
-        ),
-        constant=seen & constant,
+        time_axis=axis,
+        status=tuple(status.tolist()),
+        constant=constant,
         num_samples=num_samples,
         num_episodes=num_episodes,
         enough=tuple(
-            _enough(count, skill[i], bool(constant[i]), float(missed[i]), float(bias.value[i]))
+            _enough(count, telling[i], skill[i], missed[i], bias.value[i])
             for i, count in enumerate(num_episodes.tolist())
         ),
         bias=bias,
         error=error,
         mean=mean,
-        variance=variance,
+        variance=variance.value,
         skill=skill,
         predicted_range=ranges[0],
         observed_range=ranges[1],
@@ -130,14 +145,16 @@ def calibrate(episodes: Sequence[Episode] | Samples, *, seed: int = 0) -> Calibr
     )
 
 
-def _status(
-    seen: bool, constant: bool, pays: bool, right: bool, wrong: bool, low: float, high: float
-) -> Status:
-    if not constant:
-        return "good" if low > 0.0 else "bad" if high <= 0.0 else "open"
-    if not seen or not (pays or wrong):
-        return "not tested"
-    return "good" if right else "bad" if wrong else "open"
+def _statistics(sums: FloatArray) -> FloatArray:
+    """Returns `[R, 4, N+1]`: bias, error, skill and variance of pooled sums `[R, 5, N+1]`.
+
+    The sums are of 1, e = predicted − observed, e², o and o², with o counted from the mean of what
+    was observed. Where a sample has no variance, its skill is −∞ if there was an error and does not
+    exist if there was none.
+    """
+    n, e, ee, o, oo = np.moveaxis(sums, 1, 0)
+    variance = np.maximum(oo / n - (o / n) ** 2, 0.0)
+    return np.stack([e / n, ee / n, 1.0 - (ee / n) / variance, variance], axis=1)
 
 
 def _pays(mean: FloatArray) -> BoolArray:
@@ -158,22 +175,6 @@ def _allowed(axis: TimeAxis, mean: FloatArray, variance: FloatArray) -> FloatArr
     return np.asarray(np.maximum((SLACK * mean) ** 2, usual * scale))
 
 
-def _enough(count: int, skill: Estimate, constant: bool, missed: float, bias: float) -> int | None:
-    """Returns how many different episodes would tell; what could be missed shrinks as they grow."""
-    if constant:
-        return enough(count, np.sqrt(missed), np.sqrt(abs(bias)))
-    if count < FEWEST_EPISODES:
-        return FEWEST_EPISODES
-    reach = skill.value - skill.low if skill.value > 0.0 else skill.high - skill.value
-    return enough(count, reach, skill.value)
-
-
-def _range(samples: Samples, components: FloatArray) -> FloatArray:
-    """Returns `[2, N+2]`: the least and the most of every component, and of their sum."""
-    rows = np.column_stack([components, components.sum(axis=1)])
-    return np.stack([rows.min(axis=0), rows.max(axis=0)])
-
-
 def _could_be_missed(
     axis: TimeAxis, num_episodes: IntArray, ranges: Sequence[FloatArray]
 ) -> FloatArray:
@@ -188,32 +189,75 @@ def _could_be_missed(
     return np.asarray(missed * largest * discounts)
 
 
-def _sums(samples: Samples) -> tuple[FloatArray, BoolArray]:
-    """Returns `[E, 5, N+1]`, the sums of each episode, and `[N+1]`, what is constant.
+def _enough(count: int, telling: float, skill: Estimate, missed: float, bias: float) -> int | None:
+    """Returns how many different episodes would tell; what could be missed shrinks as they grow."""
+    if telling == 0.0:  # the reward was always the same
+        return enough(count, np.sqrt(missed), np.sqrt(abs(bias)))
+    if count < FEWEST_EPISODES:
+        return FEWEST_EPISODES
+    if telling < FEWEST_EPISODES:
+        return enough(count, np.sqrt(FEWEST_EPISODES), np.sqrt(telling))
+    reach = skill.value - skill.low if skill.value > 0.0 else skill.high - skill.value
+    return enough(count, reach, skill.value)
 
-    The sums are of 1, e = predicted − observed, e², o and o², with o counted from the mean of all
-    o, so that squares do not swallow what is small.
+
+def _range(components: FloatArray) -> FloatArray:
+    """Returns `[2, N+2]`: the least and the most of components `[M, N+1]`, and of their sum."""
+    rows = np.column_stack([components, components.sum(axis=1)])
+    return np.stack([rows.min(axis=0), rows.max(axis=0)])
+
+
+# ---- where a reward was predicted with some probability, how often it came -----------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Reliability:
+    """How often the one amount that is ever paid came, by the probability that was predicted.
+
+    Where each observed reward is either 0 or c, a component divided by γ^k·c is the probability
+    that step k pays (errata P10).
+
+    Args:
+        amount: c.
+        counts: `[N, bins]`, the predictions in each of as many equal parts of [0, 1]; those below
+            0 and above 1, which are no probabilities, are in the first and the last.
+        predicted: `[N, bins]`, their mean; NaN where there is none.
+        observed: `[N, bins]`, the share of them that was followed by the reward.
     """
-    known, observed = samples.known, samples.observed
-    count = np.maximum(known.sum(axis=0), 1)
-    centre = observed.sum(axis=0) / count  # [N+1]; what is not known is 0
-    o = np.where(known, observed - centre, 0.0)
-    e = np.where(known, samples.predicted - observed, 0.0)
-    constant = np.abs(o).max(axis=0) <= _ROUNDING * np.abs(observed).max(axis=0)
-    parts = (known.astype(np.float64), e, e * e, o, o * o)
-    return np.stack([samples.per_episode(part) for part in parts], axis=1), np.asarray(constant)
+
+    amount: float
+    counts: IntArray
+    predicted: FloatArray
+    observed: FloatArray
 
 
-def _statistics(sums: FloatArray) -> FloatArray:
-    """Returns `[R, 3, N+1]`: bias, error and skill of pooled sums `[R, 5, N+1]`.
+def reliability_of(samples: Samples) -> Reliability | None:
+    """Returns the reliability of every explicit component, None where it is not defined.
 
-    Where a sample has no variance, its skill is −∞ if there was an error and does not exist if
-    there was none.
+    It is defined for w = 1 and γ > 0, where every observed reward is 0 or one and the same amount.
     """
-    n, e, ee, o, oo = np.moveaxis(sums, 1, 0)
-    return np.stack([e / n, ee / n, 1.0 - (ee / n) / _variance(n, o, oo)], axis=1)
+    axis = samples.time_axis
+    if axis.width != 1 or axis.horizon == 0 or axis.discounts[-2] == 0.0:
+        return None
+    rewards = samples.observed[:, :-1] / axis.discounts[:-1]  # [M, N]
+    paid = rewards[rewards != 0.0]
+    if not paid.size or np.ptp(paid) > 1e-9 * np.abs(paid).max():
+        return None
+    amount = float(np.median(paid))
+    chance = samples.predicted[:, :-1] / (axis.discounts[:-1] * amount)  # [M, N]
+    known = samples.known[:, :-1]
+    part = np.clip((chance * NUM_BINS).astype(np.int64), 0, NUM_BINS - 1)
+    cells = (part + np.arange(axis.horizon) * NUM_BINS)[known]  # one number per component and bin
 
+    def sums(weights: FloatArray) -> FloatArray:
+        total = np.bincount(cells, weights[known], minlength=axis.horizon * NUM_BINS)
+        return np.asarray(total.reshape(axis.horizon, NUM_BINS))
 
-def _variance(count: FloatArray, total: FloatArray, squares: FloatArray) -> FloatArray:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.maximum(squares / count - (total / count) ** 2, 0.0))
+    counts = sums(np.ones(known.shape))
+    shown = np.where(counts > 0, counts, np.nan)
+    return Reliability(
+        amount=amount,
+        counts=counts.astype(np.int64),
+        predicted=sums(chance) / shown,
+        observed=sums((rewards != 0.0).astype(np.float64)) / shown,
+    )

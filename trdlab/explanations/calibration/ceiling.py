@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from trdlab.arrays import FloatArray
-from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.rollouts.branches import Branches
 from trdlab.rollouts.realised import per_episode
@@ -17,18 +16,14 @@ class Ceiling:
     """The skill of a perfect prediction, as far as it can be told from copies of states.
 
     Args:
-        time_axis: what the components mean.
         skill: `[N+1]`; NaN where it is not known, or where nothing varies.
         num_moments: how many moments were continued from copies.
-        copies: n, how often each was.
         deterministic: whether different things followed different moments, and the same followed
             all copies of each: then the ceiling is 1, if chance is not shared by copies.
     """
 
-    time_axis: TimeAxis
     skill: Estimates
     num_moments: int
-    copies: int
     deterministic: bool
 
 
@@ -50,17 +45,15 @@ def ceiling_of(branches: Branches, *, seed: int = 0) -> Ceiling:
 
     Source: the one-way random-effects analysis of variance, Fisher (1925).
     """
-    if branches.copies < 2 or len(branches.actions) < 2:
+    moments, n, known = len(branches.actions), branches.copies, branches.known
+    if n < 2 or moments < 2:
         raise InputError(
-            f"There are {len(branches.actions)} moments, continued {branches.copies} times each.",
+            f"There are {moments} moments, continued {n} times each.",
             "A ceiling needs at least 2 of both.",
         )
-    n, known = branches.copies, branches.known
     observed = np.where(known[:, None], branches.observed, 0.0)  # [M, n, N+1]
-    centre = observed.mean(axis=(0, 1))
-    mean = np.where(known, observed.mean(axis=1) - centre, 0.0)  # [M, N+1]
-    within = observed.var(axis=1, ddof=1)  # [M, N+1]
-    parts = (known.astype(np.float64), mean, mean**2, within)
+    mean = np.where(known, observed.mean(axis=1) - observed.mean(axis=(0, 1)), 0.0)  # [M, N+1]
+    parts = (known.astype(np.float64), mean, mean**2, observed.var(axis=1, ddof=1))
     of, count = branches.episode, branches.num_episodes
     sums = np.stack([per_episode(part, of, count) for part in parts], axis=1)  # [E, 4, N+1]
     scale = np.abs(observed).max(axis=(0, 1)) ** 2  # [N+1]
@@ -73,10 +66,8 @@ def ceiling_of(branches: Branches, *, seed: int = 0) -> Ceiling:
         return np.where(whole > 1e-12 * scale, 1.0 - noise / whole, np.nan)
 
     return Ceiling(
-        time_axis=branches.time_axis,
         skill=by_episode(sums, skill, seed=seed),
-        num_moments=len(branches.actions),
-        copies=n,
+        num_moments=moments,
         # a variance may have rounding errors
         deterministic=bool(np.ptp(observed, axis=0).any() and not np.ptp(observed, axis=1).any()),
     )

@@ -1,19 +1,19 @@
 """What there is to say of a calibration: how the agent does, how far to trust it, what is wrong."""
 
 from collections.abc import Iterator
+from itertools import groupby
 from typing import Any
 
 from trdlab.explanations.calibration import faults
-from trdlab.explanations.calibration.faults import REPORTS, rule
+from trdlab.explanations.calibration.calibration import Calibration, Status
+from trdlab.explanations.calibration.faults import REPORTS
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.calibration.residual import SHARE
-from trdlab.explanations.calibration.score import Score
 from trdlab.explanations.calibration.trust import Trust
-from trdlab.explanations.calibration.verdicts import Judged, add_verdicts
-from trdlab.explanations.rules import Claim, Fields, every, first, plain_data
+from trdlab.explanations.rules import Claim, Fields, every, plain_data
 from trdlab.explanations.sections import Section
 from trdlab.formatting import percent
-from trdlab.statistics import Estimate
+from trdlab.statistics import FEWEST_EPISODES
 
 SCHEMA = "trdlab.trust/2"
 MOST_VERDICTS = 4
@@ -25,53 +25,111 @@ WORTH_SAYING = 0.005
 
 OWN, OTHERS = "its forecasts", "its forecasts for other actions"
 
+Found = Iterator[tuple[str, Fields]]
+
 # ---- how the agent does --------------------------------------------------------------------------
 
 
-@rule("It scored {returns:number} in its one episode, which is the same every time.")
-def scored_once(report: CalibrationReport) -> Iterator[Fields]:
-    if report.score.different == 1:
-        yield _scored(report.score)
+@REPORTS.kinds(
+    {
+        "scored-once": (
+            "It scored {returns:number} in its one episode, which is the same every time."
+        ),
+        "scored-always": "It scored {returns:number} in each of {episodes:episodes}.",
+        "scored-few": "It scored {returns:number} an episode on average over {episodes:episodes}.",
+        "scored": (
+            "It scored {returns:number} an episode on average over {episodes:episodes}; the true "
+            "average is likely {low:number} to {high:number}."
+        ),
+    }
+)
+def scores(report: CalibrationReport) -> Found:
+    score, mean = report.score, report.score.returns
+    scored = {"returns": mean.value, "episodes": score.episodes, "different": score.different}
+    if score.different == 1:
+        yield "scored-once", scored
+    elif mean.low == mean.high:
+        yield "scored-always", scored
+    elif mean.low < mean.high:
+        yield "scored", scored | {"low": mean.low, "high": mean.high}
+    else:
+        yield "scored-few", scored
 
 
-@rule("It scored {returns:number} in each of {episodes:episodes}.")
-def scored_always(report: CalibrationReport) -> Iterator[Fields]:
-    returns = report.score.returns
-    if report.score.different > 1 and returns.low == returns.high:
-        yield _scored(report.score)
-
-
-@rule("It scored {returns:estimate} an episode, on average over {episodes:episodes}.")
-def scored(report: CalibrationReport) -> Iterator[Fields]:
-    returns = report.score.returns
-    if report.score.different > 1 and returns.low != returns.high:
-        yield _scored(report.score) | {"returns": returns}
-
-
-@rule("{ended:text} of them ended before the limit of {limit:steps}.")
+@REPORTS.rule("{ended:text} of them ended before the limit of {limit:steps}.")
 def some_ended(report: CalibrationReport) -> Iterator[Fields]:
     score = report.score
     if score.truncated and score.time_limit is not None:
         yield {"ended": str(score.terminated or "none"), "limit": score.time_limit}
 
 
-def _scored(score: Score) -> Fields:
-    of = {"episodes": score.episodes, "different": score.different}
-    return {"returns": score.returns.value} | of
-
-
 # ---- how far to trust it -------------------------------------------------------------------------
 
+_FEW = "{episodes:count} different episodes are too few to judge {whose:text} about {span:comes}"
 
-def _judged(report: CalibrationReport) -> Iterator[Judged]:
+
+@REPORTS.kinds(
+    {
+        "better": "{whose:text} are better than a guess about {span:comes}.",
+        "right": "{whose:text} are right about {span:comes}: it was the same every time.",
+        "no-better": "{whose:text} are no better than a guess about {span:comes}.",
+        "wrong": (
+            "{whose:text} are wrong about {span:comes}: {said:number} on average, where "
+            "{came:number} came every time."
+        ),
+        "too-few": (
+            "Judging {whose:text} about {span:comes} needs {enough:count} different episodes "
+            "instead of {episodes:count}."
+        ),
+        "unsure": f"{_FEW}; about {{enough:count}} would do.",
+        "undecided": f"{_FEW}.",
+        "silent": "{whose:text} about {span:comes} were not tested: no reward came then.",
+        "unseen": "{whose:text} about {span:comes} were not tested: {unseen:text}.",
+    }
+)
+def judged(report: CalibrationReport) -> Found:
     cut = "episodes were cut off before" if report.judged.truncated else "no episode shows it"
     unseen = "random actions came in between" if report.judged.epsilon > 0.0 else cut
-    yield Judged(OWN, report.calibration, unseen)
+    yield from _verdicts(OWN, report.calibration, unseen)
     if report.foils is not None:
-        yield Judged(OTHERS, report.foils, "no copy was followed so far")
+        yield from _verdicts(OTHERS, report.foils, "no copy was followed so far")
 
 
-VERDICTS = add_verdicts(REPORTS, _judged)
+def _verdicts(whose: str, told: Calibration, unseen: str) -> Found:
+    """Yields components in a row of which the same is to be said, with their numbers."""
+    kinds = [_kind(told, i) for i in range(len(told.status))]
+    for kind, run in groupby(range(len(kinds)), key=kinds.__getitem__):
+        first, *_, last = (*run,) * 2
+        here = slice(first, last + 1)
+        fields: Fields = {"whose": whose, "span": (first, last)}
+        if kind in ("right", "wrong"):
+            came = float(told.mean[here].sum())
+            fields |= {"said": came + float(told.bias.value[here].sum()), "came": came}
+        elif kind in ("too-few", "unsure"):
+            needed = [count for count in told.enough[here] if count is not None]
+            fields |= {"episodes": int(told.num_episodes[here].min())}
+            if len(needed) > last - first:
+                fields |= {"enough": max(needed)}
+            else:
+                kind = "undecided"
+        elif kind == "unseen":
+            fields |= {"unseen": unseen}
+        yield kind, fields
+
+
+def _kind(told: Calibration, i: int) -> str:
+    same, changing = _KINDS[told.status[i]]
+    few = told.status[i] == "open" and told.num_episodes[i] < FEWEST_EPISODES
+    return same if told.constant[i] else "too-few" if few else changing
+
+
+_KINDS: dict[Status, tuple[str, str]] = {
+    "good": ("right", "better"),
+    "bad": ("wrong", "no-better"),
+    "open": ("unsure", "unsure"),
+    "not tested": ("silent", "unseen"),
+}
+"""Of each status what is said, where the reward was the same every time and where it was not."""
 
 
 def verdicts(report: CalibrationReport, whose: str = OWN) -> list[Claim]:
@@ -81,141 +139,119 @@ def verdicts(report: CalibrationReport, whose: str = OWN) -> list[Claim]:
         report: that has judged them.
         whose: `OWN` or `OTHERS`.
     """
-    found = [claim for claim in every(report, *VERDICTS) if claim.whose == whose]
+    found = [claim for claim in every(report, *judged) if claim.whose == whose]
     return sorted(found, key=lambda claim: claim.span)
 
 
 def _in_short(claims: list[Claim]) -> list[Claim]:
     """Returns verdicts up to the first that is no good news."""
-    good = next((i for i, claim in enumerate(claims) if claim.kind not in _GOOD), len(claims))
-    return claims[: good + 1]
+    bad = (i for i, claim in enumerate(claims) if claim.kind not in ("better", "right"))
+    return claims[: next(bad, len(claims)) + 1]
 
-
-_GOOD = ("better", "right")
 
 # ---- what can be known ---------------------------------------------------------------------------
 
 
-@rule("Copies of a state never went differently, so all that comes can be known.")
-def no_chance(report: CalibrationReport) -> Iterator[Fields]:
-    if report.ceiling is not None and report.ceiling.deterministic and not report.chance:
-        yield {}
-
-
-@rule(
-    "Copies of a state never went differently, yet states that look alike did: the copies may "
-    "share their chance."
+@REPORTS.kinds(
+    {
+        "no-chance": "Copies of a state never went differently, so all that comes can be known.",
+        "shared-chance": (
+            "Copies of a state never went differently, yet states that look alike did: the copies "
+            "may share their chance."
+        ),
+        "cannot-be-known": (
+            "Chance decides what comes {component:when}: even a perfect forecast has at most "
+            "{at_most:percent} less error than a guess."
+        ),
+        "is-not-known": (
+            "More can be known of what comes {component:when}: a perfect forecast removes "
+            "{ceiling:percent} of a guess's error, this one {removes:text}."
+        ),
+        "as-good-as-can-be": (
+            "Of a guess's error about what comes {component:when} it removes {skill:percent}, "
+            "about as much as a perfect forecast."
+        ),
+    }
 )
-def shared_chance(report: CalibrationReport) -> Iterator[Fields]:
-    if report.ceiling is not None and report.ceiling.deterministic and report.chance:
-        yield {}
-
-
-@rule(
-    "Chance decides what comes {component:when}: even a perfect forecast has at most "
-    "{at_most:percent} less error than a guess."
-)
-def cannot_be_known(report: CalibrationReport) -> Iterator[Fields]:
-    for at, limit, _ in _limits(report):
+def limits(report: CalibrationReport) -> Found:
+    """What copies of states tell: of all that comes, and of each explicit component."""
+    if report.ceiling is None:
+        return
+    if report.ceiling.deterministic:
+        yield "shared-chance" if report.chance else "no-chance", {}
+    for at in range(report.time_axis.horizon):
+        limit, skill = report.ceiling.skill[at], report.calibration.skill[at]
+        about = {"component": at, "ceiling": limit.value, "skill": skill.value}
         if limit.high < LITTLE:
-            yield {"component": at, "at_most": max(limit.high, 0.0)}
-
-
-@rule(
-    "More can be known of what comes {component:when}: a perfect forecast removes "
-    "{ceiling:percent} of a guess's error, this one {removes:text}."
-)
-def is_not_known(report: CalibrationReport) -> Iterator[Fields]:
-    for at, limit, skill in _limits(report):
-        if limit.high >= LITTLE and skill.high < limit.low:
+            yield "cannot-be-known", {"component": at, "at_most": max(limit.high, 0.0)}
+        elif skill.high < limit.low:
             removes = f"{percent(skill.value)} %" if skill.value > 0.0 else "nothing"
-            numbers = {"ceiling": limit.value, "skill": skill.value}
-            yield {"component": at, "removes": removes} | numbers
-
-
-@rule(
-    "Of a guess's error about what comes {component:when} it removes {skill:percent}, about as "
-    "much as a perfect forecast."
-)
-def as_good_as_can_be(report: CalibrationReport) -> Iterator[Fields]:
-    for at, limit, skill in _limits(report):
-        if limit.high >= LITTLE and skill.high >= limit.low > 0.0 and skill.low > 0.0:
-            yield {"component": at, "ceiling": limit.value, "skill": skill.value}
-
-
-def _limits(report: CalibrationReport) -> Iterator[tuple[int, Estimate, Estimate]]:
-    """Yields each explicit component, with its ceiling and its skill."""
-    if report.ceiling is not None:
-        for at in range(report.time_axis.horizon):
-            yield at, report.ceiling.skill[at], report.calibration.skill[at]
+            yield "is-not-known", about | {"removes": removes}
+        elif limit.low > 0.0 and skill.low > 0.0:
+            yield "as-good-as-can-be", about
 
 
 def _known(report: CalibrationReport) -> list[Claim]:
-    """Returns what can be known, of the first component that is not good, or the last one."""
+    """Returns what can be known: of all, or of the first component not good, or the last."""
     at = min(report.trust.components, report.time_axis.horizon - 1)
-    found = every(report, cannot_be_known, is_not_known, as_good_as_can_be)
-    return [
-        *first(report, no_chance, shared_chance),
-        *(claim for claim in found if claim.component == at),
-    ][:1]
+    return [of for of in every(report, *limits) if of.fields.get("component", at) == at][:1]
 
 
 # ---- what comes later than it tells --------------------------------------------------------------
 
 
-@rule("{share:percent} of what it expects comes {component:when}; it does not say when.")
-def expects_later(report: CalibrationReport) -> Iterator[Fields]:
-    if report.time_axis.horizon and report.residual.value.value >= WORTH_SAYING:
-        yield _later(report) | {"share": report.residual.value.value}
-
-
-@rule(
-    "{share:percent} of what sets its best action apart from the next best comes {component:when}."
+@REPORTS.kinds(
+    {
+        "expects-later": (
+            "{share:percent} of what it expects comes {component:when}; it does not say when."
+        ),
+        "differs-later": (
+            "{share:percent} of what sets its best action apart from the next best comes "
+            "{component:when}."
+        ),
+    }
 )
-def differs_later(report: CalibrationReport) -> Iterator[Fields]:
-    if report.time_axis.horizon and report.residual.gap.value >= WORTH_SAYING:
-        yield _later(report) | {"share": report.residual.gap.value}
+def later(report: CalibrationReport) -> Found:
+    residual, horizon = report.residual, report.time_axis.horizon
+    shares = {"expects-later": residual.value.value, "differs-later": residual.gap.value}
+    for kind, share in shares.items():
+        if horizon and share >= WORTH_SAYING:
+            yield kind, {"component": horizon, "share": share}
 
 
-@rule("With N = {horizon:count}, at most {share:percent} of the rewards that came would be later.")
+@REPORTS.rule(
+    "With N = {horizon:count}, at most {share:percent} of the rewards that came would be later."
+)
 def would_suffice(report: CalibrationReport) -> Iterator[Fields]:
-    least = report.residual.sufficient()
+    least = report.residual.sufficient
     if least is not None and least > report.time_axis.horizon:
         yield {"horizon": least, "share": SHARE}
-
-
-def _later(report: CalibrationReport) -> Fields:
-    return {"component": report.time_axis.horizon}
 
 
 # ---- what it rests on ----------------------------------------------------------------------------
 
 
-@rule("Its forecasts were judged by {episodes:episodes} of {steps:steps} in all.")
-def judged_by(report: CalibrationReport) -> Iterator[Fields]:
-    yield {"episodes": report.judged.episodes, "steps": report.judged.steps}
-
-
-@rule("{cut:episodes} of these {were:text} cut off.")
-def cut_off(report: CalibrationReport) -> Iterator[Fields]:
-    if cut := report.judged.truncated:
-        yield {"cut": cut, "were": "was" if cut == 1 else "were"}
-
-
-@rule("Lives were lost {count:times} in them; for its forecasts {ends:text}.")
-def lives(report: CalibrationReport) -> Iterator[Fields]:
-    if report.judged.life_losses:
-        ends = "that is an end" if report.judged.life_loss_ends else "the episode goes on"
-        yield {"count": report.judged.life_losses, "ends": ends}
-
-
-@rule(
-    "{share:percent} of the actions in them were random; what followed one is not held against "
-    "earlier forecasts."
+@REPORTS.kinds(
+    {
+        "judged-by": "Its forecasts were judged by {episodes:episodes} of {steps:steps} in all.",
+        "cut-off": "{cut:episodes} of these {were:text} cut off.",
+        "lives": "Lives were lost {count:times} in them; for its forecasts {ends:text}.",
+        "some-random": (
+            "{share:percent} of the actions in them were random; what followed one is not held "
+            "against earlier forecasts."
+        ),
+    }
 )
-def some_random(report: CalibrationReport) -> Iterator[Fields]:
-    if report.judged.epsilon > 0.0:
-        yield {"share": report.judged.epsilon}
+def basis(report: CalibrationReport) -> Found:
+    of = report.judged
+    yield "judged-by", {"episodes": of.episodes, "steps": of.steps}
+    if of.truncated:
+        yield "cut-off", {"cut": of.truncated, "were": "was" if of.truncated == 1 else "were"}
+    if of.life_losses:
+        ends = "that is an end" if of.life_loss_ends else "the episode goes on"
+        yield "lives", {"count": of.life_losses, "ends": ends}
+    if of.epsilon > 0.0:
+        yield "some-random", {"share": of.epsilon}
 
 
 # ---- what is told --------------------------------------------------------------------------------
@@ -223,33 +259,25 @@ def some_random(report: CalibrationReport) -> Iterator[Fields]:
 
 def sections(report: CalibrationReport) -> tuple[Section, ...]:
     """Returns all that there is to say of a report, under the questions that it answers."""
+    wrong = every(report, *faults.beyond, faults.off_from, faults.amount_off, faults.smeared)
     hidden = report.residual.value.value > SHARE
-    wrong = (
-        *faults.faults(report),
-        *every(report, faults.overestimates, faults.underestimates),
-        *every(report, faults.off_from, faults.amount_off, faults.smeared),
-    )
-    later = every(report, expects_later, differs_later, *([would_suffice] if hidden else []))
-    found = (
-        Section("score", "How it does", (*_score(report),)),
-        Section("trust", "How far to trust it", (*_trust(report), *_known(report))),
-        Section("faults", "What is wrong", wrong),
-        Section("later", "What comes later than it tells", (*later,)),
-        Section("others", "Other actions", (*_in_short(verdicts(report, OTHERS)),)),
-        Section(
-            "judged",
-            "What this rests on",
-            (*every(report, judged_by, cut_off, lives, some_random),),
-        ),
-    )
-    return tuple(section for section in found if section)
+    late = every(report, *later, *([would_suffice] if hidden else []))
+    found = {
+        ("score", "How it does"): every(report, *scores, some_ended),
+        ("trust", "How far to trust it"): [*_trust(report), *_known(report)],
+        ("faults", "What is wrong"): [*faults.faults(report), *wrong],
+        ("later", "What comes later than it tells"): late,
+        ("others", "Other actions"): _in_short(verdicts(report, OTHERS)),
+        ("judged", "What this rests on"): every(report, *basis),
+    }
+    return tuple(Section(*title, tuple(claims)) for title, claims in found.items() if claims)
 
 
 def in_brief(report: CalibrationReport) -> list[Claim]:
     """Returns how the agent does, how far to trust it, and the worst that is wrong."""
     told = {section.name: section.claims for section in sections(report)}
-    trust = told["trust"][:1]
-    return [*told["score"][:1], *trust, *(told.get("faults") or told["trust"][1:])[:1]]
+    trust = told["trust"]
+    return [*told["score"][:1], *trust[:1], *(told.get("faults") or trust[1:])[:1]]
 
 
 def _trust(report: CalibrationReport) -> list[Claim]:
@@ -258,13 +286,6 @@ def _trust(report: CalibrationReport) -> list[Claim]:
     if len(found) <= MOST_VERDICTS:
         return found
     return list(dict.fromkeys([*_in_short(found), found[-1]]))
-
-
-def _score(report: CalibrationReport) -> list[Claim]:
-    return [
-        *first(report, scored_once, scored_always, scored),
-        *some_ended(report),
-    ]
 
 
 # ---- as data -------------------------------------------------------------------------------------

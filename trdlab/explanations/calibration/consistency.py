@@ -61,20 +61,13 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
     d·g·n′_(i−1) + b·(1−g)·y_(i−1) + c·(1−g)·z_(i−1), by least squares. By the law d = γ^w and
     b = c = 0. Means are compared, because where there is chance a step fits the next on average
     only; over steps of about the same age, because the age is known before anything happens.
-    Pairs with a random action after the first are left out, and those that reach beyond a
-    truncation (see `what_followed`).
-
-    Args:
-        episodes: what was predicted and what happened; all of one time axis.
-        seed: of the bootstrap, which is by episode.
 
     Raises:
         InputError: there are no episodes, or of different time axes; there are no components to
             compare (N = 0), or no two steps w apart.
     """
-    axis = common_axis(episodes)
-    pairs = [_Pairs.of(episode) for episode in episodes]
-    ages = np.concatenate([of.ages for of in pairs])
+    axis, pairs = common_axis(episodes), [_pairs(episode) for episode in episodes]
+    ages, _, goes_on = (np.concatenate(of) for of in zip(*pairs, strict=True))
     if axis.horizon == 0 or not ages.size:
         raise InputError(
             f"There are {ages.size} pairs of steps to compare, N is {axis.horizon}.",
@@ -82,21 +75,21 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
         )
     edges = np.unique(np.quantile(ages, np.arange(1, NUM_AGES) / NUM_AGES, method="higher"))
     first = _shifted(np.mean([episode.expected[0] for episode in episodes], axis=0))  # [N]
-    sums = np.stack([of.sums(edges, first) for of in pairs])  # [E, 5, ages, N]
+    each = zip(episodes, pairs, strict=True)
+    sums = np.stack([_sums(episode, *of, edges, first) for episode, of in each])  # [E, 5, ages, N]
     scale = max(float(np.abs(of.decomposition.components).max()) for of in episodes)
     sums[:, 1:] *= np.abs(sums[:, 1:]) > RELATIVE_ZERO * scale  # the rest is rounding
-    drawn = draws(len(sums), seed)  # [1 + R, E]
-    discount = axis.gamma**axis.width
+    drawn, discount = draws(len(sums), seed), axis.gamma**axis.width  # [1 + R, E]
     count, before, after = pooled(drawn, sums[:, :3].sum(axis=2)).transpose(1, 0, 2)
     gap = (before - discount * after) / np.maximum(count, 1.0)  # [1 + R, N]
-    enough, mass = has_enough(sums), np.abs(before[0]).cumsum()  # [N]
+    mass = np.abs(before[0]).cumsum()  # [N]
     near = np.arange(axis.horizon) <= (mass >= mass[-1] / 2.0).argmax()
-    fitted = _fitted(drawn, sums[:, 1:], discount)
+    fitted, enough = _fitted(drawn, sums[:, 1:], discount), has_enough(sums)
     estimates = percentiles(fitted, enough)
     return Consistency(
         time_axis=axis,
         num_transitions=len(ages),
-        num_ends=sum(int((~of.goes_on).sum()) for of in pairs),
+        num_ends=int((~goes_on).sum()),
         gap=percentiles(gap, enough),
         discount=estimates[0],
         discount_near=_fitted(drawn[:1], sums[:, 1:, :, near], discount)[0, 0],
@@ -107,45 +100,39 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Pairs:
-    """The K pairs of steps of one episode.
+def _pairs(episode: Episode) -> tuple[IntArray, IntArray, BoolArray]:
+    """Returns `[K]` thrice: t, the observation at t+w, or the last one, and whether it goes on.
 
-    Args:
-        ages: `[K]`, t.
-        before: `[K, N]`, the components from 1 on of the action taken at t.
-        after: `[K, N]`, what they should be without the discount, if the episode goes on.
-        goes_on: `[K]`, whether it does, up to t+w.
+    Left out are pairs with a random action after the first, and those that reach beyond a
+    truncation (see `what_followed`).
     """
+    total, width, far = len(episode), episode.time_axis.width, np.iinfo(np.int64).max
+    t = np.arange(total)
+    end = next_flag(episode.ends, far)  # [T]
+    random = next_flag(np.append(episode.random, False), far)[1 : total + 1]
+    goes_on = end >= t + width
+    usable = (~goes_on | (t + width <= total)) & (random >= t + width)
+    if episode.time_limit is not None:
+        usable &= t + width <= episode.time_limit
+    to = np.where(goes_on, t + width, np.minimum(end, total - 1) + 1)
+    return t[usable], to[usable], goes_on[usable]
 
-    ages: IntArray
-    before: FloatArray
-    after: FloatArray
-    goes_on: BoolArray
 
-    @classmethod
-    def of(cls, episode: Episode) -> "_Pairs":
-        total, width, far = len(episode), episode.time_axis.width, np.iinfo(np.int64).max
-        t = np.arange(total)
-        end = next_flag(episode.ends, far)  # [T]
-        random = next_flag(np.append(episode.random, False), far)[1 : total + 1]
-        goes_on = end >= t + width
-        usable = (~goes_on | (t + width <= total)) & (random >= t + width)
-        if episode.time_limit is not None:
-            usable &= t + width <= episode.time_limit
-        ages = t[usable]
-        to = np.where(goes_on, t + width, np.minimum(end, total - 1) + 1)[usable]
-        before = episode.predicted[ages, 1:].astype(np.float64)
-        return cls(ages, before, _shifted(episode.expected[to]), goes_on[usable])
-
-    def sums(self, edges: FloatArray, first: FloatArray) -> FloatArray:
-        """Returns `[5, ages, N]`: of 1, before, and after where it goes on, ends, and is reset."""
-        goes_on, ends = self.goes_on[:, None], ~self.goes_on[:, None]
-        ones = np.ones_like(self.before)
-        parts = (ones, self.before, self.after * goes_on, self.after * ends, first * ends)
-        age = np.searchsorted(edges, self.ages, side="right")
-        of_age = (age == np.arange(len(edges) + 1)[:, None]).astype(np.float64)  # [ages, K]
-        return np.asarray(of_age @ np.stack(parts))
+def _sums(
+    episode: Episode,
+    t: IntArray,
+    to: IntArray,
+    goes_on: BoolArray,
+    edges: FloatArray,
+    first: FloatArray,
+) -> FloatArray:
+    """Returns `[5, ages, N]`: of 1, before, and after where it goes on, ends, and is reset."""
+    before, after = episode.predicted[t, 1:].astype(np.float64), _shifted(episode.expected[to])
+    on, over = goes_on[:, None], ~goes_on[:, None]
+    parts = (np.ones_like(before), before, after * on, after * over, first * over)
+    age = np.searchsorted(edges, t, side="right")
+    of_age = (age == np.arange(len(edges) + 1)[:, None]).astype(np.float64)  # [ages, K]
+    return np.asarray(of_age @ np.stack(parts))
 
 
 def _shifted(components: FloatArray) -> FloatArray:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.rollouts.realised import Samples
 from trdlab.statistics import Estimate, by_episode, draws, has_enough, pooled
@@ -30,10 +29,8 @@ class Errors:
     places, divided by `amount` if that `is_off`, and then `smear` is looked for.
 
     Args:
-        time_axis: what the components mean.
         shift: by how many components rewards are predicted too late; negative if too early. It is
             0 unless another one is the best in nearly all bootstrap samples.
-        agreement: the share of bootstrap samples in which the best shift is the best.
         amount: how many times as much is predicted as comes, of all explicit components together.
             NaN where nothing came.
         smear: x, where p + x·(2p − p₋ − p₊) is the best prediction that can be had from p and its
@@ -42,9 +39,7 @@ class Errors:
             the timing has 0.
     """
 
-    time_axis: TimeAxis
     shift: int
-    agreement: float
     amount: Estimate
     smear: Estimate
 
@@ -57,31 +52,30 @@ def is_off(amount: Estimate) -> bool:
 def errors_of(samples: Samples, *, seed: int = 0) -> Errors:
     """Returns what is wrong with the timing, the amount and the sharpness of a forecast.
 
-    Args:
-        samples: predictions and what followed them.
-        seed: of the bootstrap, which is by episode.
-
     Raises:
         InputError: there are fewer than 2 explicit components, or their discounts vanish.
     """
-    axis = samples.time_axis
+    axis, known = samples.time_axis, samples.known[:, :-1]  # [M, N]
     if axis.horizon < 2 or axis.discounts[-2] < MIN_DISCOUNT:
         raise InputError(
             f"Components of {axis} cannot stand in for each other.",
             "Decompose with N of at least 2, and γ above 0.",
         )
-    known = samples.known[:, :-1]  # [M, N]
     p, o = (of[:, :-1] / axis.discounts[:-1] for of in (samples.predicted, samples.observed))
     best, agreement = _best_shift(samples, p, o, seed)
     is_sure = agreement >= AGREEMENT and not _spoils(samples, p, o, best, seed)
     shift = best if is_sure else 0
-    here = np.arange(max(0, -shift), min(axis.horizon, axis.horizon - shift))  # [K], in range
+    there, here = _places(shift, axis.horizon)[0]
     known = known[:, here]
-    p, o = (np.where(known, of, 0.0) for of in (p[:, here + shift], o[:, here]))
-    amount = _amount(samples, p, o, axis.discounts[here], seed)
+    p, o = (np.where(known, of, 0.0) for of in (p[:, there], o[:, here]))
+    weights = axis.discounts[here] * np.sign(o.sum(axis=0))  # so that gains and costs add up
+    amount = _ratio(samples, p @ weights, o @ weights, seed)
     scaled = p / amount.value if is_off(amount) and amount.value else p
-    smear = _smear(samples, np.where(known, _bend(scaled), 0.0), o - scaled, seed)
-    return Errors(axis, shift, agreement, amount, smear)
+    bend = np.zeros_like(p)  # 2p − p₋ − p₊, and 0 where a neighbour is missing
+    bend[:, 1:-1] = 2.0 * scaled[:, 1:-1] - scaled[:, :-2] - scaled[:, 2:]
+    bend = np.where(known, bend, 0.0)
+    over, under = (np.einsum("mk,mk->m", bend, of) for of in (o - scaled, bend))
+    return Errors(shift, amount, smear=_ratio(samples, over, under, seed))
 
 
 def _best_shift(samples: Samples, p: FloatArray, o: FloatArray, seed: int) -> tuple[int, float]:
@@ -139,26 +133,9 @@ def _places(shift: int, horizon: int) -> list[tuple[IntArray, IntArray]]:
     return [(k + shift, k), (k, k), (k + shift, k + shift)]
 
 
-def _amount(
-    samples: Samples, p: FloatArray, o: FloatArray, discounts: FloatArray, seed: int
-) -> Estimate:
-    """Returns Σp̄ / Σō over components `[M, K]`, each counted by the sign of its ō."""
-    weights = discounts * np.sign(o.sum(axis=0))
-    sums = samples.per_episode(np.column_stack([p @ weights, o @ weights]))  # [E, 2]
+def _ratio(samples: Samples, over: FloatArray, under: FloatArray, seed: int) -> Estimate:
+    """Returns Σover / Σunder of `[M]` each; NaN where there is nothing to divide by."""
+    sums = samples.per_episode(np.column_stack([over, under]))  # [E, 2]
     return by_episode(
         sums, lambda of: np.where(of[:, 1] > 0.0, of[:, 0] / of[:, 1], np.nan), seed=seed
     )[()]
-
-
-def _smear(samples: Samples, bend: FloatArray, missed: FloatArray, seed: int) -> Estimate:
-    """Returns x of the best `missed` = x·`bend`, over all components and samples `[M, K]`."""
-    pairs = ((bend, missed), (bend, bend))
-    products = np.stack([np.einsum("mk,mk->m", *pair) for pair in pairs], axis=1)  # [M, 2]
-    return by_episode(samples.per_episode(products), lambda of: of[:, 0] / of[:, 1], seed=seed)[()]
-
-
-def _bend(p: FloatArray) -> FloatArray:
-    """Returns `[M, K]`: 2p − p₋ − p₊, and 0 where a neighbour is missing."""
-    bend = np.zeros_like(p)
-    bend[:, 1:-1] = 2.0 * p[:, 1:-1] - p[:, :-2] - p[:, 2:]
-    return bend

@@ -9,9 +9,9 @@ from trdlab.explanations.calibration.consistency import Consistency
 from trdlab.explanations.calibration.errors import LEAST_SMEAR, is_off
 from trdlab.explanations.calibration.errors import SLACK as AMOUNT
 from trdlab.explanations.calibration.report import CalibrationReport
-from trdlab.explanations.rules import Claim, Fields, Language, every
+from trdlab.explanations.rules import Claim, Fields, Form, Language, every
 from trdlab.explanations.words import forms_of
-from trdlab.statistics import Estimate
+from trdlab.statistics import FEWEST_EPISODES
 
 EXPLAINED = 0.95
 """The share of the components that must fit what follows, for a fault between them to be named."""
@@ -20,30 +20,38 @@ SLACK = 0.2
 
 _ROUNDING = 1e-9  # relative to the largest component
 
-REPORTS = Language[CalibrationReport](
-    "this report", lambda report: forms_of(report.time_axis, report.seconds_per_step)
-)
-rule = REPORTS.rule
+
+def _forms(report: CalibrationReport) -> dict[str, Form]:
+    axis = report.time_axis
+    forms = forms_of(axis, report.seconds_per_step)
+
+    def comes(span: tuple[int, int], digits: int) -> str:
+        is_all = axis.start(span[0]) == 0 and axis.steps(span[1]) is None
+        return "all that comes" if is_all else f"what comes {forms['span'].show(span, digits)}"
+
+    return forms | {"comes": Form(comes)}
+
+
+REPORTS = Language[CalibrationReport]("this report", _forms)
 
 # ---- timing and amount ---------------------------------------------------------------------------
 
 
-@rule("It expects rewards {steps:steps} too {late:text}.")
+@REPORTS.rule("It expects rewards {steps:steps} too {late:text}.")
 def mistimed(report: CalibrationReport) -> Iterator[Fields]:
     if report.errors is not None and (shift := report.errors.shift):
         late = "late" if shift > 0 else "early"
         yield {"steps": abs(shift) * report.time_axis.width, "late": late}
 
 
-@rule("{span:span} it expects {share:percent} of what comes.")
+@REPORTS.rule("{span:span} it expects {share:percent} of what comes.")
 def amount_off(report: CalibrationReport) -> Iterator[Fields]:
     if report.errors is not None and is_off(report.errors.amount):
         yield {"span": (0, report.time_axis.horizon - 1), "share": report.errors.amount.value}
 
 
-@rule(
-    "It expects {amount:text} of what comes {span:span}: {said:number} on average, where "
-    "{came:number} came."
+@REPORTS.rule(
+    "It expects {amount:text} of {span:comes}: {said:number} on average, where {came:number} came."
 )
 def off_from(report: CalibrationReport) -> Iterator[Fields]:
     """Near components are not surely off by a tenth; all others are, to the same side."""
@@ -52,7 +60,7 @@ def off_from(report: CalibrationReport) -> Iterator[Fields]:
     told, explicit = report.calibration, report.time_axis.horizon
     tested = np.flatnonzero(~told.is_("not tested")[:explicit])
     bias, much = told.bias, np.abs(told.bias.value) > AMOUNT * np.abs(told.mean)
-    sides = np.where((bias.low > 0.0) & much, 1, np.where((bias.high < 0.0) & much, -1, 0))
+    sides = much * ((bias.low > 0.0) * 1 - (bias.high < 0.0))
     end = int(tested[-1]) + 1 if tested.size else 0
     begin = end - int(np.append(sides[:end][::-1] != sides[end - 1], True).argmax())
     if 0 < begin < end and sides[end - 1] and not sides[:begin].any():
@@ -62,38 +70,44 @@ def off_from(report: CalibrationReport) -> Iterator[Fields]:
         yield {"span": (begin, end - 1), "said": said, "came": came, "amount": amount}
 
 
-@rule("It spreads rewards over the steps before and after, more than their timing is uncertain.")
+@REPORTS.rule(
+    "It spreads rewards over the steps before and after, more than their timing is uncertain."
+)
 def smeared(report: CalibrationReport) -> Iterator[Fields]:
     if report.errors is not None and report.errors.smear.low > LEAST_SMEAR and not faults(report):
         yield {"smear": report.errors.smear}
 
 
-@rule(
-    "It expects up to {said:number}: too much, for at most {most:number} can come if no step pays "
-    "more than {reward:number}, the most seen."
+@REPORTS.kinds(
+    {
+        "overestimates": (
+            "It expects up to {said:number}: too much, for at most {most:number} can come if no "
+            "step pays more than {reward:number}, the most seen."
+        ),
+        "underestimates": (
+            "It expects as little as {said:number}: too little, for at least {least:number} comes "
+            "if no step pays less than {reward:number}, the least seen."
+        ),
+    }
 )
-def overestimates(report: CalibrationReport) -> Iterator[Fields]:
-    reward, said = report.judged.most, float(report.calibration.predicted_range[1, -1])
-    most = max(reward, 0.0) / (1.0 - report.time_axis.gamma)
-    if said > most + _ROUNDING * report.scale:
-        yield {"said": said, "most": most, "reward": reward}
+def beyond(report: CalibrationReport) -> Iterator[tuple[str, Fields]]:
+    """It expects more, or less, than if every step paid the most, or the least, that one did.
 
-
-@rule(
-    "It expects as little as {said:number}: too little, for at least {least:number} comes if no "
-    "step pays less than {reward:number}, the least seen."
-)
-def underestimates(report: CalibrationReport) -> Iterator[Fields]:
-    reward, said = report.judged.least, float(report.calibration.predicted_range[0, -1])
-    least = min(reward, 0.0) / (1.0 - report.time_axis.gamma)
-    if said < least - _ROUNDING * report.scale:
-        yield {"said": said, "least": least, "reward": reward}
+    Few episodes without any reward, or without any cost, do not tell that none can come.
+    """
+    (least, most), paid = report.calibration.predicted_range[:, -1].tolist(), report.judged
+    whole, slack = 1.0 / (1.0 - report.time_axis.gamma), _ROUNDING * report.scale
+    is_few = paid.different < FEWEST_EPISODES
+    if most > (limit := max(paid.most, 0.0) * whole) + slack and not (is_few and not limit):
+        yield "overestimates", {"said": most, "most": limit, "reward": paid.most}
+    if least < (limit := min(paid.least, 0.0) * whole) - slack and not (is_few and not limit):
+        yield "underestimates", {"said": least, "least": limit, "reward": paid.least}
 
 
 # ---- between one step and the next ---------------------------------------------------------------
 
 
-@rule(
+@REPORTS.rule(
     "It discounts what comes {width:steps} later by {measured:number}, and not by {right:number}."
 )
 def discount_off(report: CalibrationReport) -> Iterator[Fields]:
@@ -103,10 +117,10 @@ def discount_off(report: CalibrationReport) -> Iterator[Fields]:
         yield {"width": axis.width, "measured": measured, "right": right}
 
 
-@rule("It ignores where episodes end: it counts in {share:percent} of what {what:text}.")
+@REPORTS.rule("It ignores where episodes end: it counts in {share:percent} of what {what:text}.")
 def end_ignored(report: CalibrationReport) -> Iterator[Fields]:
     found = report.consistency
-    if found is not None and is_end_ignored(found):
+    if found is not None and found.explained >= EXPLAINED and found.past_end.low > 0.5:
         is_next = found.past_reset.low > 0.5
         what = "the start of the next one promises" if is_next else "it expects after that"
         yield {"share": found.past_end.value, "what": what, "is_next": is_next}
@@ -124,37 +138,14 @@ def faults(report: CalibrationReport) -> list[Claim]:
 
     The last two are named only if hardly anything else is wrong between components, which is so if
     `EXPLAINED` of them fits what follows.
-
-    Args:
-        report: on the forecasts.
     """
     return every(report, mistimed, discount_off, end_ignored)
 
 
 def is_discount_wrong(found: Consistency) -> bool:
     """Returns whether the discount is surely wrong (see `faults`)."""
-    all_of_them, gamma = discount_exponent(found), found.time_axis.gamma
-    near, far = (_exponent(of, gamma) for of in (found.discount_near, found.discount_far))
-    least, most = ((1.0 + sign * SLACK) * found.time_axis.width for sign in (-1.0, 1.0))
-    if not found.explained >= EXPLAINED:
-        return False
-    parts = [part for part in (near, far) if not math.isnan(part)]
-    below = all_of_them.high < least and all(part < least for part in parts)
-    return below or (all_of_them.low > most and all(part > most for part in parts))
-
-
-def is_end_ignored(found: Consistency) -> bool:
-    """Returns whether what is expected after an end surely counts (see `faults`)."""
-    return found.explained >= EXPLAINED and found.past_end.low > 0.5
-
-
-def discount_exponent(found: Consistency) -> Estimate:
-    """Returns x, where components are multiplied by γ^x from one to the next; w if all is well."""
-    of, gamma = found.discount, found.time_axis.gamma
-    return Estimate(*(_exponent(discount, gamma) for discount in (of.value, of.high, of.low)))
-
-
-def _exponent(discount: float, gamma: float) -> float:
-    if math.isnan(discount) or gamma == 0.0:
-        return math.nan
-    return math.log(discount) / math.log(gamma) if discount > 0.0 else math.inf
+    gamma, width, whole = found.time_axis.gamma, found.time_axis.width, found.discount
+    parts = [of for of in (found.discount_near, found.discount_far) if not math.isnan(of)]
+    least, most = (gamma ** ((1.0 + sign * SLACK) * width) for sign in (1.0, -1.0))
+    is_wrong = min([whole.low, *parts]) > most or max([whole.high, *parts]) < least
+    return is_wrong and found.explained >= EXPLAINED

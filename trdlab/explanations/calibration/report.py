@@ -13,13 +13,71 @@ from trdlab.explanations.calibration.ceiling import Ceiling, ceiling_of
 from trdlab.explanations.calibration.consistency import Consistency, consistency_of
 from trdlab.explanations.calibration.errors import MIN_DISCOUNT, Errors, errors_of
 from trdlab.explanations.calibration.residual import Residual, residual_of
-from trdlab.explanations.calibration.score import Score, score_of
 from trdlab.explanations.calibration.trust import Trust, trust
 from trdlab.printable import Printable
 from trdlab.rollouts.branches import Branches
 from trdlab.rollouts.counterfactual import Seen
-from trdlab.rollouts.episodes import Episode
+from trdlab.rollouts.episodes import Episode, distinct
 from trdlab.rollouts.realised import pool
+from trdlab.statistics import FEWEST_EPISODES, Estimate, bootstrap
+
+
+@dataclass(frozen=True)
+class Score:
+    """How an agent did in some episodes, and how they ended.
+
+    Args:
+        episodes: E.
+        different: how many of them are not the same as another one.
+        steps: of all together.
+        epsilon: the chance of a random action.
+        returns: the mean of the undiscounted rewards of an episode, as they are counted; its ends
+            are NaN where fewer than `FEWEST_EPISODES` differ, unless all pay the same.
+        least: the least reward of any step.
+        most: the largest.
+        terminated: how many ended for good.
+        truncated: how many were cut off.
+        life_losses: how often a life was lost and the episode went on.
+        life_loss_ends: whether that counts as an end.
+        time_limit: the steps after which they were cut off, if that is known.
+    """
+
+    episodes: int
+    different: int
+    steps: int
+    epsilon: float
+    returns: Estimate
+    least: float
+    most: float
+    terminated: int
+    truncated: int
+    life_losses: int
+    life_loss_ends: bool
+    time_limit: int | None = None
+
+
+def score_of(episodes: Sequence[Episode], *, seed: int = 0) -> Score:
+    """Returns how an agent did in some episodes, one or more; the seed is of the bootstrap."""
+    returns = np.array([episode.rewards.sum() for episode in episodes])
+    mean = bootstrap(returns, rng=np.random.default_rng(seed))
+    different = len(distinct(episodes))
+    if different < FEWEST_EPISODES and np.ptp(returns) > 0.0:
+        mean = Estimate(mean.value, np.nan, np.nan)
+    terminated, limits = sum(e.terminated for e in episodes), {e.time_limit for e in episodes}
+    return Score(
+        episodes=len(episodes),
+        different=different,
+        steps=sum(map(len, episodes)),
+        epsilon=max(e.epsilon for e in episodes),
+        returns=mean,
+        least=float(min(e.rewards.min() for e in episodes)),
+        most=float(max(e.rewards.max() for e in episodes)),
+        terminated=terminated,
+        truncated=len(episodes) - terminated,
+        life_losses=sum(int(e.life_lost.sum()) for e in episodes),
+        life_loss_ends=any(bool((e.life_lost & e.ends).any()) for e in episodes),
+        time_limit=limits.pop() if len(limits) == 1 else None,
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -35,21 +35,15 @@ class Residual:
     gap: Estimate
     observed_tails: FloatArray
 
-    def sufficient(self, share: float = SHARE) -> int | None:
-        """Returns the least N at which no more than a share of the reward would be residual.
-
-        It is read off the rewards that were observed; None where too few were.
-        """
-        enough = np.flatnonzero(self.observed_tails <= share)
+    @property
+    def sufficient(self) -> int | None:
+        """The least N at which no more than `SHARE` of the rewards that came would be residual."""
+        enough = np.flatnonzero(self.observed_tails <= SHARE)
         return -(-int(enough[0]) // self.time_axis.width) if enough.size else None
 
 
 def residual_of(episodes: Sequence[Episode], *, seed: int = 0) -> Residual:
     """Returns how much of values, and of the differences between actions, is in the residual.
-
-    Args:
-        episodes: what was predicted and what happened; all of one time axis.
-        seed: of the bootstrap, which is by episode.
 
     Raises:
         InputError: there are no episodes, or they are of different time axes.
@@ -61,12 +55,7 @@ def residual_of(episodes: Sequence[Episode], *, seed: int = 0) -> Residual:
         lambda pooled: pooled[..., -1] / pooled.sum(axis=-1),
         seed=seed,
     )
-    return Residual(
-        time_axis=axis,
-        value=shares[0],
-        gap=shares[1],
-        observed_tails=_observed_tails(episodes, axis.gamma),
-    )
+    return Residual(axis, shares[0], shares[1], _observed_tails(episodes, axis.gamma))
 
 
 def _gaps(episode: Episode) -> FloatArray:
@@ -83,14 +72,12 @@ def _observed_tails(episodes: Sequence[Episode], gamma: float) -> FloatArray:
     """Returns `[L]`, of all steps; nothing where some were cut off, for these are the long ones."""
     if any(not episode.ends[-1] for episode in episodes):
         return np.zeros(0)
-    longest = max(len(episode) for episode in episodes)
-    sums = np.zeros(longest + 1)
+    sums = np.zeros(max(map(len, episodes)) + 1)
     for episode in episodes:
         for part in np.split(episode.rewards, np.flatnonzero(episode.ends) + 1)[:-1]:
-            left, tail = np.zeros(len(part) + 1), 0.0
+            left = np.zeros(len(part) + 1)  # the discounted reward from each step to the end
             for step in reversed(range(len(part))):
-                tail = abs(part[step]) + gamma * tail
-                left[step] = tail  # the discounted reward from here to the end
+                left[step] = abs(part[step]) + gamma * left[step + 1]
             sums[: len(left)] += np.cumsum(left[::-1])[::-1]  # of all steps that are m later
-    sums *= gamma ** np.arange(longest + 1)
+    sums *= gamma ** np.arange(len(sums))
     return np.asarray(sums / sums[0] if sums[0] else np.zeros(0))

@@ -24,7 +24,8 @@ class Trust:
     @property
     def components(self) -> int:
         """How many explicit components in a row, from the first on, are good."""
-        return next((i for i, x in enumerate(self.status[:-1]) if x != "good"), self._horizon)
+        explicit = self.status[:-1]
+        return next((i for i, own in enumerate(explicit) if own != "good"), len(explicit))
 
     @property
     def residual(self) -> bool:
@@ -39,21 +40,13 @@ class Trust:
     @property
     def is_whole(self) -> bool:
         """Whether all explicit components are good."""
-        return self.components == self._horizon > 0
+        return self.components == self.time_axis.horizon > 0
 
     @property
     def doubtful(self) -> BoolArray:
-        """`[N+1]`: the components that are not to be trusted in any one forecast.
-
-        Of the explicit ones these are all from the first on that is not good.
-        """
-        beyond = np.arange(self.time_axis.num_components) >= self.components
-        beyond[-1] = not self.residual
-        return beyond
-
-    @property
-    def _horizon(self) -> int:
-        return self.time_axis.horizon
+        """`[N+1]`: the components not to be trusted: from the first on that is not good."""
+        explicit = np.arange(self.time_axis.horizon) >= self.components
+        return np.append(explicit, not self.residual)
 
 
 def trust(calibration: Calibration) -> Trust:

@@ -45,26 +45,15 @@ class Trial:
         """Whether something is known of what came."""
         return not np.isnan(self.found.observed.value[-1])
 
-    def gaps(self) -> Iterator[Fields]:
-        """Yields each difference that was forecast, and what came: at components, then in all.
-
-        The component of what comes in all is None.
-        """
-        found, names = self.found, (self.action, self.foil)
-        for entry, said in enumerate(found.predicted.tolist()):
-            came = found.observed[entry]
-            if said == 0.0 or np.isnan(came.value):
-                continue
-            more, less = names if said > 0.0 else names[::-1]
-            at = None if entry == len(found.predicted) - 1 else entry
-            came = came if said > 0.0 else -came
-            yield {"more": more, "less": less, "came": came, "said": abs(said), "component": at}
-
     def to_dict(self) -> dict[str, Any]:
         """Returns the numbers and the claims as plain data at full precision."""
-        names = {"action": self.action, "foil": self.foil}
-        told = {"findings": [claim.to_dict() for claim in _told(self)]}
-        return {**plain_data(self.found), **names, **told}
+        told = [claim.to_dict() for claim in _told(self)]
+        return {
+            **plain_data(self.found),
+            "action": self.action,
+            "foil": self.foil,
+            "findings": told,
+        }
 
 
 def _forms(trial: Trial) -> dict[str, Form]:
@@ -73,28 +62,20 @@ def _forms(trial: Trial) -> dict[str, Form]:
 
     def at(component: int | None, digits: int) -> str:
         if component is not None:
-            return " " + forms["when"].show(component, digits)
-        return "" if whole else " " + forms["within"].show(axis.num_steps - 1, digits)
+            return forms["when"].show(component, digits) + " "
+        return "" if whole else forms["within"].show(axis.num_steps - 1, digits) + " "
 
-    def paid(component: int | None, is_past: bool) -> str:
-        if component is None and whole:
-            return "was worth" if is_past else "is worth"
-        return "paid" if is_past else "pays"
+    def does(worth: str, pays: str) -> Form:
+        return Form(lambda component, _: worth if component is None and whole else pays)
 
-    return forms | {
-        "at": Form(at),
-        "paid": Form(lambda component, _: paid(component, is_past=True)),
-        "pays": Form(lambda component, _: paid(component, is_past=False)),
-    }
+    is_worth = {"paid": does("was worth", "paid"), "pays": does("is worth", "pays")}
+    return forms | is_worth | {"at": Form(at)}
 
 
 TRIALS = Language[Trial]("this trial", _forms)
-rule = TRIALS.rule
-
-# ---- how often -----------------------------------------------------------------------------------
 
 
-@rule("{action} and {foil} were each tried {copies:times} from here{how:text}.")
+@TRIALS.rule("{action} and {foil} were each tried {copies:times} from here{how:text}.")
 def tried(trial: Trial) -> Iterator[Fields]:
     how = ", and each brought the same every time" if trial.found.same_every_time else ""
     if not trial.is_seen:
@@ -103,7 +84,74 @@ def tried(trial: Trial) -> Iterator[Fields]:
 
 
 # ---- whether what was forecast came --------------------------------------------------------------
-# `more` is the action that was forecast to be ahead, so what was said is above 0.
+
+_MORE = "{component:at}{more} {component:paid} %s more than {less}"
+
+
+@TRIALS.kinds(
+    {
+        "came-exactly": f"As forecast, {_MORE % '{said:number}'}.",
+        "came-as-forecast": (
+            f"As forecast, {_MORE % '{came:estimate}'}; {{said:number}} was forecast."
+        ),
+        "by-another-amount": (
+            f"{_MORE % '{came:estimate}'}, {{than:text}} than the {{said:number}} that was "
+            "forecast."
+        ),
+        "less-than-forecast": (
+            f"{_MORE % 'at most {most:number}'}, less than the {{said:number}} that was forecast."
+        ),
+        "against-the-forecast": (
+            "Against the forecast, {component:at}{less} {component:paid} {ahead:estimate} more "
+            "than {more}; {more} was to be {said:number} ahead."
+        ),
+        "no-difference": (
+            f"Against the forecast, {_MORE % 'no'}; {{said:number}} more was forecast."
+        ),
+        "too-few-tries": (
+            "Trying each {copies:times} was too few to tell whether {component:at}{more} "
+            "{component:pays} more than {less}; about {enough:count} would do."
+        ),
+        "too-close-to-tell": (
+            "Trying cannot tell whether {component:at}{more} {component:pays} more than {less}: "
+            "they are too close."
+        ),
+    }
+)
+def outcomes(trial: Trial) -> Iterator[tuple[str, Fields]]:
+    """Of each difference that was forecast, whether it came."""
+    for gap in _gaps(trial):
+        came, said, copies = gap["came"], gap["said"], trial.found.copies
+        if came.low > 0.0:
+            if not _includes(came, said):
+                yield "by-another-amount", gap | {"than": "more" if came.low > said else "less"}
+            else:
+                yield "came-as-forecast" if came.low < came.high else "came-exactly", gap
+        elif came.high < 0.0:
+            yield "against-the-forecast", gap | {"ahead": -came}
+        elif came.low == came.high:
+            yield "no-difference", gap
+        elif came.high < said:
+            yield "less-than-forecast", gap | {"most": came.high}
+        else:
+            needed = enough(copies, (came.high - came.low) / 2.0, said)
+            kind = "too-close-to-tell" if needed is None else "too-few-tries"
+            yield kind, gap | {"copies": copies, "enough": needed and max(needed, 2 * copies)}
+
+
+def _gaps(trial: Trial) -> Iterator[Fields]:
+    """Yields each difference that was forecast, and what came: at components, then in all.
+
+    `more` is the action that was forecast to be ahead, so what was said is above 0. The component
+    of what comes in all is None.
+    """
+    found, names = trial.found, (trial.action, trial.foil)
+    for entry, said in enumerate(found.predicted.tolist()):
+        came = found.observed[entry] if said > 0.0 else -found.observed[entry]
+        if said and not np.isnan(came.value):
+            more, less = names if said > 0.0 else names[::-1]
+            at = None if entry == len(found.predicted) - 1 else entry
+            yield {"more": more, "less": less, "came": came, "said": abs(said), "component": at}
 
 
 def _includes(came: Estimate, value: float) -> bool:
@@ -112,104 +160,7 @@ def _includes(came: Estimate, value: float) -> bool:
     return came.low - slack <= value <= came.high + slack
 
 
-@rule("As forecast, {more} {component:paid} {said:number} more than {less}{component:at}.")
-def came_exactly(trial: Trial) -> Iterator[Fields]:
-    """There is no chance, and it is what was forecast."""
-    for gap in trial.gaps():
-        came = gap["came"]
-        if came.low == came.high > 0.0 and _includes(came, gap["said"]):
-            yield gap
-
-
-@rule(
-    "As forecast, {more} {component:paid} {came:estimate} more than {less}{component:at}; "
-    "{said:number} was forecast."
-)
-def came_as_forecast(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        is_certain = gap["came"].low == gap["came"].high
-        if gap["came"].low > 0.0 and _includes(gap["came"], gap["said"]) and not is_certain:
-            yield gap
-
-
-@rule(
-    "{more} {component:paid} {came:estimate} more than {less}{component:at}, {than:text} than the "
-    "{said:number} that was forecast."
-)
-def by_another_amount(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        if gap["came"].low > 0.0 and not _includes(gap["came"], gap["said"]):
-            yield gap | {"than": "more" if gap["came"].low > gap["said"] else "less"}
-
-
-@rule(
-    "{more} {component:paid} at most {most:number} more than {less}{component:at}, less than the "
-    "{said:number} that was forecast."
-)
-def less_than_forecast(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        came = gap["came"]
-        if came.low <= 0.0 <= came.high < gap["said"] and came.low < came.high:
-            yield gap | {"most": came.high}
-
-
-@rule(
-    "Against the forecast, {less} {component:paid} {ahead:estimate} more than {more}"
-    "{component:at}; {more} was to be {said:number} ahead."
-)
-def against_the_forecast(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        if gap["came"].high < 0.0:
-            yield gap | {"ahead": -gap["came"]}
-
-
-@rule(
-    "Against the forecast, {more} {component:paid} no more than {less}{component:at}; "
-    "{said:number} more was forecast."
-)
-def no_difference(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        if gap["came"].low == gap["came"].high == 0.0:
-            yield gap
-
-
-def _open(trial: Trial) -> Iterator[Fields]:
-    """Yields the differences that may have come or not, and how many tries would tell."""
-    for gap in trial.gaps():
-        came, copies = gap["came"], trial.found.copies
-        if came.low <= 0.0 and gap["said"] <= came.high and came.low < came.high:
-            needed = enough(copies, (came.high - came.low) / 2.0, gap["said"])
-            yield gap | {"copies": copies, "enough": needed and max(needed, 2 * copies)}
-
-
-@rule(
-    "Trying each {copies:times} was too few to tell whether {more} {component:pays} more than "
-    "{less}{component:at}; about {enough:count} would do."
-)
-def too_few_tries(trial: Trial) -> Iterator[Fields]:
-    yield from (gap for gap in _open(trial) if gap["enough"] is not None)
-
-
-@rule(
-    "Trying cannot tell whether {more} {component:pays} more than {less}{component:at}: they are "
-    "too close."
-)
-def too_close_to_tell(trial: Trial) -> Iterator[Fields]:
-    yield from (gap for gap in _open(trial) if gap["enough"] is None)
-
-
 # ---- what is told --------------------------------------------------------------------------------
-
-_OUTCOMES = (
-    came_exactly,
-    came_as_forecast,
-    by_another_amount,
-    less_than_forecast,
-    against_the_forecast,
-    no_difference,
-    too_few_tries,
-    too_close_to_tell,
-)
 
 
 def sections(trial: Trial) -> tuple[Section, ...]:
@@ -219,32 +170,27 @@ def sections(trial: Trial) -> tuple[Section, ...]:
 
 def in_brief(trial: Trial) -> list[Claim]:
     """Returns what came in all, and what came against the forecast when; nothing if not seen."""
-    told = [claim for claim in _told(trial) if claim.rule in _OUTCOMES]
     return [
-        claim for claim in told if claim.component is None or claim.rule is against_the_forecast
+        claim
+        for claim in _outcomes(trial)
+        if claim.component is None or claim.kind == "against-the-forecast"
     ][:2]
 
 
 def _told(trial: Trial) -> tuple[Claim, ...]:
-    order, furthest = _outcomes(trial), _furthest(trial)
-    told = [claim for claim in order if claim.component is None or claim.component in furthest]
-    return (*told, *tried(trial))
+    return (*_outcomes(trial), *tried(trial))
 
 
 def _outcomes(trial: Trial) -> list[Claim]:
-    """Returns what came in all, and then of each component."""
+    """Returns what came in all, and then where each action was forecast to be furthest ahead.
+
+    A component that holds less than `WORTH_SAYING` of all that differs is not worth a sentence.
+    """
     if not trial.is_seen:
         return []
-    found = every(trial, *_OUTCOMES)
-    return sorted(found, key=lambda claim: -1 if claim.component is None else claim.component)
-
-
-def _furthest(trial: Trial) -> set[int]:
-    """Returns the components at which each action was forecast to be furthest ahead.
-
-    One that holds less than `WORTH_SAYING` of all that differs is not worth a sentence.
-    """
     explicit = trial.found.predicted[: trial.found.time_axis.horizon]
     least = WORTH_SAYING * np.abs(explicit).sum()
     furthest = {int(explicit.argmax()), int(explicit.argmin())} if explicit.size else set()
-    return {i for i in furthest if abs(explicit[i]) >= least}
+    told = {None, *(i for i in furthest if abs(explicit[i]) >= least)}
+    found = [claim for claim in every(trial, *outcomes) if claim.component in told]
+    return sorted(found, key=lambda claim: -1 if claim.component is None else claim.component)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from trdlab.explanations.moment import contrast, forecast, sensitivity
 from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.explanations.moment.together import first_together
 from trdlab.explanations.rules import Claim, Fields, every, first
 from trdlab.explanations.sections import Section, at_first
 
@@ -49,7 +50,7 @@ def _why(choice: Choice) -> str:
 def _contrast(choice: Choice) -> list[Claim]:
     if choice.foil is None:
         return every(choice, no_alternative)
-    return contrast.contrast(choice)
+    return contrast.contrast(choice) + every(choice, first_together)
 
 
 @CHOICES.rule("The episode is over here: no action pays anything any more.")

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from trdlab.arrays import FloatArray
-from trdlab.explanations.calibration.reliability import Reliability
+from trdlab.explanations.calibration.calibration import Reliability
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.formatting import amount
 from trdlab.show.plots import bars, style

@@ -1,6 +1,5 @@
 """An episode: what was done, what was expected all along, and the rewards that came."""
 
-from collections.abc import Sequence
 from itertools import groupby, pairwise
 from typing import Any, Literal
 
@@ -42,22 +41,20 @@ def story_figure(
     title: str = "",
     *,
     trust: Trust | None = None,
-    captions: Sequence[str] = (),
     world: Gridworld | None = None,
     table: ExactTable | None = None,
 ) -> Figure:
-    """Returns the picture of an episode.
+    """Returns the picture of an episode; the sentence of each key moment stands below it.
 
     Args:
         told: the story.
         title: of the picture.
         trust: how far such forecasts can be trusted, if that is known.
-        captions: a sentence for each key moment, written beneath by its number.
         world: the gridworld it was played in; its map is drawn, with the way that was taken.
         table: the exact table of that world.
     """
     played = told.played
-    lines = [f"{number}  {line}" for number, line in enumerate(captions, 1)]
+    lines = [f"{number}  {claim.sentence}" for number, claim in enumerate(told.moments, 1)]
     states = None if table is None else route_taken(table, played.episode)
     top = 0.0 if world is None or states is None else _MAP * map_height(world)
     height = 4.8 + top + sum(_LINE * -(-len(line) // style.LETTERS) for line in lines)

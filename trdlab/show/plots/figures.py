@@ -1,6 +1,7 @@
 """The picture of each noun, and the pictures of an explained agent, one for each part."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,6 @@ from trdlab.show.plots.comparison import comparison_figure
 from trdlab.show.plots.episode import story_figure
 from trdlab.show.plots.map import solved_figure, world_figure
 from trdlab.show.plots.moment import moment_figure, possible_range
-from trdlab.show.plots.style import check_pictures, save
 from trdlab.tabular import ExactTable
 
 
@@ -55,20 +55,17 @@ def explanation_figure(explained: Explanation, part: Part | None = None) -> Figu
 
 def part_figure(explained: Explanation, part: Part) -> Figure | None:
     """Returns the picture of a part; None where there is nothing to draw."""
-    agent, report, told = explained.agent, explained.report, explained.story
+    agent, report, choice = explained.agent, explained.report, explained.choice
     if part == "calibration":
         return None if report is None else trust_figure(report, agent.name)
     if part == "episode":
-        return None if told is None else _episode(explained, told)
-    found, trial = explained.choice, explained.trial
-    if found is None or (part == "contrast" and found.foil is None):
+        return None if explained.story is None else _episode(explained, explained.story)
+    if choice is None or (part == "contrast" and choice.foil is None):
         return None
     return moment_figure(
-        found.moment,
-        found.action,
-        found.foil if part == "contrast" else None,
+        choice if part == "contrast" else replace(choice, foil=None),
         f"{agent.name}, step {explained.step} of the episode with seed {explained.seed}",
-        trial=trial if part == "contrast" else None,
+        trial=explained.trial if part == "contrast" else None,
         possible=possible_range(agent.estimator),
     )
 
@@ -76,35 +73,10 @@ def part_figure(explained: Explanation, part: Part) -> Figure | None:
 def picture_paths(
     folder: Path, parts: tuple[Part, ...], *, seed: int, step: int
 ) -> dict[Part, Path]:
-    """Returns where the picture of each part goes, once it is known that it can be written.
-
-    Args:
-        folder: where to; it is made if there is none.
-        parts: what was asked for; nothing stands for all.
-        seed: of the episode that is explained.
-        step: of that episode.
-
-    Raises:
-        OutputError: one of them exists, or cannot be written.
-    """
+    """Returns where the picture of each part goes; of all parts where none was asked for."""
     ending = {"episode": f"-seed-{seed}", "calibration": ""}
     moment = f"-seed-{seed}-step-{step}"
-    paths = {part: folder / f"{part}{ending.get(part, moment)}.png" for part in parts or PARTS}
-    check_pictures(paths.values())
-    return paths
-
-
-def write_pictures(explained: Explanation, paths: dict[Part, Path]) -> list[Path]:
-    """Writes the pictures of an explained agent that there are, and returns their paths.
-
-    Raises:
-        OutputError: one cannot be written.
-    """
-    figures = {path: part_figure(explained, part) for part, path in paths.items()}
-    written = [(path, found) for path, found in figures.items() if found is not None]
-    for path, found in written:
-        save(found, path)
-    return [path for path, _ in written]
+    return {part: folder / f"{part}{ending.get(part, moment)}.png" for part in parts or PARTS}
 
 
 def _episode(explained: Explanation, told: Story) -> Figure:
@@ -113,7 +85,6 @@ def _episode(explained: Explanation, told: Story) -> Figure:
         told,
         f"{agent.name}, the episode with seed {explained.seed}",
         trust=None if report is None else report.trust,
-        captions=[claim.sentence for claim in told.moments],
         world=agent.world if isinstance(agent.world, Gridworld) else None,
         table=agent.estimator if isinstance(agent.estimator, ExactTable) else None,
     )
@@ -128,7 +99,7 @@ _FIGURES: dict[type, Callable[..., Figure]] = {
     Comparison: comparison_figure,
     ExactTable: _of_table,
     Explanation: explanation_figure,
-    Choice: lambda of, **how: moment_figure(of.moment, of.action, of.foil, **how),
+    Choice: moment_figure,
     Gridworld: world_figure,
     Moment: lambda of, **how: figure(of.choice(), **how),
     Played: lambda of, **how: story_figure(tell(of), **how),

@@ -1,6 +1,7 @@
 """Maps: where each action leads, where an episode went, and the picture of a solved world."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 from textwrap import fill
 from typing import Any
@@ -22,6 +23,7 @@ from trdlab.show.plots.moment import (
     EXPECTED,
     PANEL,
     explain_marks,
+    names_of,
     plot_moment,
     possible_range,
     without_noise,
@@ -30,29 +32,30 @@ from trdlab.show.scenes import Scene, scene_of
 from trdlab.tabular import ExactTable
 
 _MOST_ROUTE_STEPS = 1_000
-_LANES = (-0.12, 0.12)  # of the action's route and of the foil's, beside the middle of a cell
+_LINES, _LANES = ("-", (0, (2.2, 1.0))), (-0.12, 0.12)  # of the action's route and of the foil's
 _TALLEST = 3.2  # inches
 
 
 @style.settings()
 def solved_figure(solved: SolvedState) -> Figure:
     """Returns the picture of a solved world: its map, and below it the bars of a state."""
-    choice, table, scene = solved.choice, solved.table, scene_of(solved.world, solved.state)
-    world = solved.world if isinstance(solved.world, Gridworld) else None
-    words = max(1.6 * len(scene.drawing.splitlines()), 3.0 + len(scene.legend))
-    top = 0.2 * words if world is None else map_height(world)
+    choice, world, scene = solved.choice, solved.world, scene_of(solved.world, solved.state)
+    if isinstance(world, Gridworld):
+        top = map_height(world)
+    else:
+        top = 0.2 * max(1.6 * len(scene.drawing.splitlines()), 3.0 + len(scene.legend))
     panels = 1 if choice.foil is None else 3
     figure = style.new_figure(1.6 + top + PANEL * panels, scene.caption)
     first, *rest = figure.subplots(1 + panels, 1, height_ratios=(top, *(PANEL,) * panels))
-    if world is None:
-        plot_scene(first, scene, solved.state)
+    if isinstance(world, Gridworld):
+        plot_map(first, world, solved.table, solved.state, names_of(choice))
     else:
-        plot_map(first, world, table, solved.state, choice.action, choice.foil)
-    bound = float(table.solution.error_bound[solved.state].max())
-    moment = without_noise(choice.moment, bound)
-    plot_moment(rest, moment, choice.action, choice.foil, possible=possible_range(table))
+        plot_scene(first, scene, solved.state)
+    bound = float(solved.table.solution.error_bound[solved.state].max())
+    choice = replace(choice, moment=without_noise(choice.moment, bound))
+    plot_moment(rest, choice, possible=possible_range(solved.table))
     rest[len(rest) // 2].set_ylabel(EXPECTED)
-    explain_marks(figure, moment, choice.action, choice.foil)
+    explain_marks(figure, choice)
     return figure
 
 
@@ -71,7 +74,7 @@ def map_height(world: Gridworld) -> float:
 
 
 def plot_map(
-    ax: Axes, world: Gridworld, table: ExactTable, state: int, action: str, foil: str | None = None
+    ax: Axes, world: Gridworld, table: ExactTable, state: int, actions: Sequence[str]
 ) -> Axes:
     """Draws a state of a gridworld, the policy, and the route that each action leads to.
 
@@ -79,23 +82,18 @@ def plot_map(
     until the episode ends or comes back to where it was.
 
     Args:
-        ax: the axes to draw on.
+        ax: the axes to draw on; they are returned.
         world: the gridworld.
         table: its table; the routes follow its policy.
         state: the index of the state.
-        action: the name of the explained action; its route is solid.
-        foil: the name of its foil; its route is dashed.
-
-    Returns:
-        `ax`.
+        actions: the names of one or two; the route of the second is dashed.
     """
     draw_map(ax, world, state)
     _draw_policy(ax, world, table, state)
     colours, handles = style.action_colours(world.action_names), []
-    names = [action] if foil is None else [action, foil]
-    for name, dashes, lane in zip(names, (None, (2.2, 1.0)), _LANES, strict=False):
+    for name, line, lane in zip(actions, _LINES, _LANES, strict=False):
         states = route(table, state, world.action_names.index(name))
-        drawn = plot_route(ax, world, states, colours[name], dashes=dashes, lane=lane)
+        drawn = plot_route(ax, world, states, colours[name], line=line, lane=lane)
         drawn.set_label(f"route after {name}")
         handles.append(drawn)
     handles.append(bars.handle("the policy", "", ">", style.MUTED, style.MUTED))
@@ -110,7 +108,7 @@ def plot_route(
     states: Sequence[int],
     colour: str = style.INK,
     *,
-    dashes: tuple[float, float] | None = None,
+    line: Any = "-",
     lane: float = 0.0,
 ) -> Line2D:
     """Draws a way over a map, on the ground: it hides nothing, and stops before what it leads to.
@@ -120,7 +118,7 @@ def plot_route(
         world: the gridworld.
         states: those that the way goes through.
         colour: of the line.
-        dashes: how long they are, and how far apart; None for a solid line.
+        line: its style, as matplotlib has it.
         lane: how far beside the middle of the cells it goes.
 
     Returns:
@@ -139,7 +137,6 @@ def plot_route(
             "", points[-1], points[-1] - 0.3 * ahead, arrowprops=head, zorder=ABOVE_ROUTES + 1.0
         )
         points[-1] -= 0.1 * ahead
-    line = "-" if dashes is None else (0, dashes)
     (drawn,) = ax.plot(*points.T, color=colour, linestyle=line, linewidth=2.5, zorder=3)
     return drawn
 

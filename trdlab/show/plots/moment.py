@@ -12,7 +12,7 @@ from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition
 from trdlab.estimator import Estimator, Future
 from trdlab.explanations.calibration.calibration import Status
-from trdlab.explanations.moment.moment import Moment
+from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.outcome import Trial
 from trdlab.formatting import decimals_between, decimals_for
 from trdlab.show.plots import bars, style
@@ -32,59 +32,42 @@ EXPECTED = "expected discounted reward"
 
 @style.settings()
 def moment_figure(
-    moment: Moment,
-    action: str,
-    foil: str | None = None,
-    title: str = "",
-    *,
-    trial: Trial | None = None,
-    possible: Range = ANY,
+    choice: Choice, title: str = "", *, trial: Trial | None = None, possible: Range = ANY
 ) -> Figure:
     """Returns the picture of an action, or of two and their difference (see `plot_moment`)."""
-    panels = 1 if foil is None else 3
+    panels = 1 if choice.foil is None else 3
     figure = style.new_figure(1.6 + PANEL * panels, title)
     axes = np.atleast_1d(figure.subplots(panels, 1, sharex=True)).tolist()
-    plot_moment(axes, moment, action, foil, trial=trial, possible=possible)
+    plot_moment(axes, choice, trial=trial, possible=possible)
     figure.supylabel(EXPECTED, fontsize=style.TEXT, color=style.MUTED)
-    explain_marks(figure, moment, action, foil, trial)
+    explain_marks(figure, choice, trial)
     return figure
 
 
 def plot_moment(
-    axes: Sequence[Axes],
-    moment: Moment,
-    action: str,
-    foil: str | None = None,
-    *,
-    trial: Trial | None = None,
-    possible: Range = ANY,
+    axes: Sequence[Axes], choice: Choice, *, trial: Trial | None = None, possible: Range = ANY
 ) -> Sequence[Axes]:
     """Draws an action; with a foil, both on one scale, and their difference below them.
 
     Args:
-        axes: one, or three that share their steps.
-        moment: the decompositions.
-        action: the name of an action.
-        foil: the name of another.
+        axes: one, or three that share their steps; they are returned.
+        choice: the action and its foil.
         trial: what came of the two, where they were tried.
         possible: the values that a component can have; whiskers end there.
-
-    Returns:
-        `axes`.
     """
-    names = [action] if foil is None else [action, foil]
+    moment, names = choice.moment, names_of(choice)
     values = [moment.q_value(name) for name in names]
-    decimals = decimals_for(values) if foil is None else decimals_between(*values)
+    decimals = decimals_for(values) if len(values) == 1 else decimals_between(*values)
     ends = [_ends(moment, name, possible) for name in names]
     scale = scale_of(np.stack([moment.components(name) for name in names]), *ends)
     for ax, name, value in zip(axes, names, values, strict=False):
         plot_action(ax, moment, name, scale=scale, possible=possible)
         _title(ax, f"{name}: Q = {style.told(value, decimals)}", moment.components(name))
-    if foil is not None:
-        plot_contrast(axes[-1], moment, action, foil, trial=trial)
-        delta = settled(moment.difference(action, foil))
+    if choice.foil is not None:
+        plot_contrast(axes[-1], moment, choice.action, choice.foil, trial=trial)
+        delta = settled(moment.difference(choice.action, choice.foil))
         gap = style.told(float(delta.sum()), decimals_for([delta.sum()]))
-        _title(axes[-1], f"{action} − {foil}: {gap}", delta)
+        _title(axes[-1], f"{choice.action} − {choice.foil}: {gap}", delta)
     for ax in axes[:-1]:
         ax.tick_params(labelbottom=False)
     axes[-1].set_xlabel(style.STEPS)
@@ -94,19 +77,17 @@ def plot_moment(
 def plot_action(
     ax: Axes, moment: Moment, action: str, *, scale: Scale | None = None, possible: Range = ANY
 ) -> Axes:
-    """Draws what is expected of an action, with whiskers (see `whiskers`).
+    """Draws what is expected of an action on `ax`, which is returned, with `whiskers`.
 
     What has not proved better than a guess stands on red or grey ground. Where the episode may end
     meanwhile, a dotted line is the chance that it is still running, with a scale on the right.
-
-    It is drawn on `ax`, which is returned; see `plot_moment`. Without a `scale` the axes show all
-    bars of this action.
+    Without a `scale` the axes show all bars of this action.
     """
     components, ends = moment.components(action), _ends(moment, action, possible)
     scale = scale_of(components[None], ends) if scale is None else scale
     colour = style.action_colours(moment.action_names)[action]
     plot_components(ax, components, moment.time_axis, colour=colour, scale=scale)
-    _draw_doubts(ax, moment, [action])
+    style.draw_grounds(ax, style.positions(moment.time_axis), _doubts(moment, action))
     if ends is not None:
         bars.draw_whiskers(ax, style.positions(moment.time_axis), ends, scale)
     chance = _survival(moment, action)
@@ -118,28 +99,26 @@ def plot_action(
 def plot_contrast(
     ax: Axes, moment: Moment, action: str, foil: str, *, trial: Trial | None = None
 ) -> Axes:
-    """Draws action minus foil: up, and in the colour of the action, where that pays more.
+    """Draws action minus foil on `ax`, which is returned.
 
-    Diamonds are what came of their difference in a trial of both. It is drawn on `ax`, which is
-    returned.
+    Bars go up, and have the colour of the action, where that pays more. Diamonds are what came of
+    the difference in a trial of both.
     """
     delta, axis = settled(moment.difference(action, foil)), moment.time_axis
     came = None if trial is None else _came(trial)
     scale, colours = scale_of(delta[None], came), style.action_colours(moment.action_names)
     plot_components(ax, delta, axis, colour=(colours[action], colours[foil]), scale=scale)
-    _draw_doubts(ax, moment, [action, foil])
+    style.draw_grounds(ax, style.positions(axis), _doubts(moment, action, foil))
     if came is not None:
         bars.draw_whiskers(ax, style.positions(axis) + 0.2, came[1:], scale, came[0])
     return ax
 
 
-def explain_marks(
-    figure: Figure, moment: Moment, action: str, foil: str | None, trial: Trial | None = None
-) -> None:
+def explain_marks(figure: Figure, choice: Choice, trial: Trial | None = None) -> None:
     """Adds a legend of the marks that are there, and says whose future it is."""
-    names = [action] if foil is None else [action, foil]
+    moment, names = choice.moment, names_of(choice)
     handles: list[Artist] = [bars.residual_handle()]
-    handles += style.ground_handles(set(_doubts(moment, names)) - {"good"})
+    handles += style.ground_handles(_doubts(moment, *names))
     if meaning := whiskers(moment):
         handles.append(bars.handle(f"whiskers: {meaning}"))
     if any((_survival(moment, name) < 1.0).any() for name in names):
@@ -154,6 +133,11 @@ def explain_marks(
     style.add_legend(figure, handles, axis_title(moment.time_axis), " · ".join(whose))
 
 
+def names_of(choice: Choice) -> list[str]:
+    """Returns the action and, if there is one, its foil."""
+    return [choice.action] if choice.foil is None else [choice.action, choice.foil]
+
+
 def whiskers(moment: Moment) -> str:
     """Returns what the whiskers of a moment mean, empty where there are none."""
     if not any((_lengths(moment, name) > 0.0).any() for name in moment.action_names):
@@ -165,16 +149,12 @@ def whiskers(moment: Moment) -> str:
 
 def without_noise(moment: Moment, error: float) -> Moment:
     """Returns a moment in which all that is within a proven error is 0, variances too."""
-    told, known = moment.decomposition, moment.uncertainty
+    found, known = moment.decomposition, moment.uncertainty
+    found = RewardDecomposition(settled(found.components, error), found.time_axis)
     if known is not None:
         spread = np.where(known.deviation**2 <= error, 0.0, known.deviation)
         known = replace(known, deviation=spread)
-    components = settled(told.components, error)
-    return replace(
-        moment,
-        decomposition=RewardDecomposition(components, told.time_axis),
-        uncertainty=known,
-    )
+    return replace(moment, decomposition=found, uncertainty=known)
 
 
 def possible_range(estimator: Estimator) -> Range:
@@ -208,18 +188,12 @@ def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:
     ax.patch.set_visible(False)
 
 
-def _doubts(moment: Moment, actions: Sequence[str]) -> list[Status]:
-    """Returns N+1: the worst of what was found of actions; all good where nothing was judged."""
+def _doubts(moment: Moment, *actions: str) -> list[Status | None]:
+    """Returns N+1: the worst of what was found of actions; None where there is no doubt."""
     judged = [moment.status_of(name) for name in actions if moment.trust_of(name) is not None]
-    order: tuple[Status, ...] = ("bad", "not tested", "open", "good")
-    good: list[Status] = ["good"] * moment.time_axis.num_components
-    return [min(found, key=order.index) for found in zip(good, *judged, strict=True)]
-
-
-def _draw_doubts(ax: Axes, moment: Moment, actions: Sequence[str]) -> None:
-    places, doubts = style.positions(moment.time_axis), _doubts(moment, actions)
-    where = np.flatnonzero(np.array(doubts) != "good")
-    style.draw_grounds(ax, places[where], [doubts[i] for i in where])
+    order: tuple[Status, ...] = ("bad", "not tested", "open")
+    columns = zip(*judged, strict=True) if judged else [()] * moment.time_axis.num_components
+    return [next((doubt for doubt in order if doubt in found), None) for found in columns]
 
 
 def _lengths(moment: Moment, action: str) -> FloatArray:

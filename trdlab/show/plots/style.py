@@ -7,9 +7,8 @@ their text can be read on a phone; they need no pyplot, and no backend of the us
 """
 
 import io
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal
@@ -81,9 +80,21 @@ class Picture(Figure):
         with settings():
             super().draw(renderer)
 
+    def savefig(self, *args: Any, **options: Any) -> None:
+        """Saves it as any figure is, but laid out first: matplotlib draws twice for that."""
+        engine = self.get_layout_engine()
+        with settings():
+            if engine is not None:
+                engine.execute(self)
+            self.set_layout_engine(None)
+            try:
+                super().savefig(*args, **options)
+            finally:
+                self.set_layout_engine(engine)
+
     def _repr_png_(self) -> bytes:
         file = io.BytesIO()
-        self.savefig(file, format="png", dpi=_DPI)
+        self.savefig(file, format="png")
         return file.getvalue()
 
 
@@ -98,7 +109,7 @@ def settings() -> Iterator[None]:
 
 def new_figure(height: float, title: str = "") -> Picture:
     """Returns an empty picture of a height in inches; what is drawn in it is laid out by itself."""
-    figure = Picture(figsize=(WIDTH, height), layout="constrained")
+    figure = Picture(figsize=(WIDTH, height), dpi=_DPI, layout="constrained")
     FigureCanvasAgg(figure)
     if title:
         lines = -(-len(title) // 62)
@@ -141,8 +152,7 @@ def save(figure: Figure, path: Path) -> None:
     except OSError as error:
         cause = f"Cannot make the folder '{path.parent}': {error.strerror or error}."
         raise OutputError(cause, "Choose another folder.") from error
-    with settings():
-        write_whole(path, partial(figure.savefig, dpi=_DPI))
+    write_whole(path, figure.savefig)
 
 
 def action_colours(names: Sequence[str]) -> dict[str, str]:
@@ -195,15 +205,16 @@ def label_steps(ax: Axes, axis: TimeAxis, places: FloatArray) -> None:
     ax.set_xlim(places[0] - 0.6, places[-1] + 0.6)
 
 
-def draw_grounds(ax: Axes, places: FloatArray, status: Sequence[str]) -> None:
-    """Colours the ground of components by the evidence for them."""
+def draw_grounds(ax: Axes, places: FloatArray, status: Sequence[str | None]) -> None:
+    """Colours the ground of components by the evidence for them; None has no ground."""
     for place, found in zip(places, status, strict=True):
-        ax.axvspan(place - 0.5, place + 0.5, color=EVIDENCE[found], linewidth=0, zorder=0)
+        if found is not None:
+            ax.axvspan(place - 0.5, place + 0.5, color=EVIDENCE[found], linewidth=0, zorder=0)
 
 
-def ground_handles(status: Collection[str]) -> list[Patch]:
+def ground_handles(status: Iterable[str | None]) -> list[Patch]:
     """Returns what a legend explains of grounds: only those that there are."""
-    there = {EVIDENCE[found] for found in status}
+    there = {EVIDENCE[found] for found in status if found is not None}
     return [Patch(color=c, label=meaning) for c, meaning in GROUNDS.items() if c in there]
 
 

@@ -1,0 +1,31 @@
+"""Together: the first reward comes at the same step after either of two actions."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from trdlab.explanations.moment.forecast import first_expected, first_reward
+from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.explanations.rules import Fields, every
+
+
+@CHOICES.rule(
+    "After either {action} or {foil}, the first {effect:text}{expected:text} comes "
+    "{component:when}."
+)
+def first_together(choice: Choice) -> Iterator[Fields]:
+    """Nothing that stands out comes before it; how much it is may differ."""
+    for action, foil in choice.orders[:1]:
+        ones, others = (
+            every(replace(choice, action=name, foil=None), first_reward, first_expected)
+            for name in (action, foil)
+        )
+        coming = {(other.kind, other.effect, other.component) for other in others}
+        for one in ones if choice.moment.difference(action, foil).any() else ():
+            if (one.kind, one.effect, one.component) in coming:
+                yield {
+                    "action": action,
+                    "foil": foil,
+                    "effect": one.effect,
+                    "expected": "" if one.is_sure else " to expect",
+                    "component": one.component,
+                }

@@ -47,18 +47,20 @@ def expanded(markdown: str, root: Path) -> str:
 def exports(package: Path, root: Path) -> Iterator[tuple[str, Path]]:
     """Yields the names that a package exports, and the file that each of them is defined in."""
     tree = _parsed(package / "__init__.py")
-    homes = {
-        name.name: _file(node.module, root)
+    imported = [
+        (name, _file(node.module, root))
         for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom) and node.module
         for name in node.names
-    }
+    ]
+    homes = {name.name: home for name, home in imported}
     lists = [
         node.value
         for node in tree.body
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
     ]
-    for name in ast.literal_eval(lists[0]) if lists else ():
+    again = [name.name for name, _ in imported if name.asname == name.name]  # as type checkers say
+    for name in ast.literal_eval(lists[0]) if lists else again:
         if not name.startswith("_"):
             yield name, homes.get(name, package / "__init__.py")
 

@@ -31,7 +31,7 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(expla
         "Both pay 4 in total, but each step of waiting makes a reward count 5 % less: "
         "down is worth 3.52, up 3.26.",
         "As forecast, down was worth 0.266 more than up.",
-        "Its forecasts are better than a guess about what comes within 4 steps.",
+        "Its forecasts are better than a guess about what comes in the first 4 steps.",
     ]
     moments = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png"]
     names = [*moments, "episode-seed-0.png", "calibration.png"]
@@ -100,7 +100,7 @@ def test_the_story_of_an_episode_as_text_as_json_and_as_a_picture(explain):
     code, out, err = explain(*words, "--out", "pictures")
     assert code == 0
     assert "loop,slip=0.2 · the episode with seed 3" in out
-    assert "At the start it expected rewards worth 1.14, the largest part in 4 steps or" in out
+    assert "At the start the agent expected rewards worth 1.14, the largest part after the" in out
     assert "The episode was cut off after 100 steps." in out
     assert err == "Picture: pictures/episode-seed-3.png\n"
     _, out, _ = explain(*words, "--json")
@@ -130,7 +130,7 @@ def test_a_map_file_is_an_agent_too(explain, tmp_path):
     file.write_text("S..C\n", encoding="utf-8")
     code, out, _ = explain(file, "--what", "forecast", "--N", 3, "--episodes", 0)
     assert code == 0
-    assert "After right the first reward comes in 2 steps: 1." in out
+    assert "With right, the first reward comes 2 steps later: it is 1." in out
     assert "How far to trust it" not in out
 
 
@@ -153,7 +153,7 @@ def test_a_run_is_explained_by_its_own_rewards(explain, trained):
 def test_a_run_says_how_long_a_step_is(explain, trained):
     _, out, _ = explain(trained, "--episodes", 12, "--out", "pictures", "--details")
     assert "a step is 0.25 s of play" in out
-    assert "It counts the sign of each reward." in out
+    assert "Of each reward only the sign counts." in out
     assert len(list(Path("pictures").iterdir())) == 4
 
 

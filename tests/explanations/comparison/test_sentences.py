@@ -217,7 +217,7 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
     with pytest.raises(UnsupportedSentenceError, match="no statement about this comparison"):
         read("A is the better one.", real()[0])
     with pytest.raises(UnsupportedSentenceError, match="is not true of this comparison"):
-        read("They would take the same action at 99 % of the states.", real()[0])
+        read("They would take the same action in 99 % of the states.", real()[0])
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)

@@ -197,9 +197,9 @@ def test_sixth_lesson_reads_to_a_student_what_is_wrong() -> None:
             r"^(\w+)'s report says:\n((?:  .*\n)+)", printed_by(LESSONS[5]), re.MULTILINE
         )
     }
-    assert "It expects rewards 1 step too early." in reports["Ada"]
+    assert "The agent expects rewards 1 step too early." in reports["Ada"]
     assert "by 0.947, and not by 0.90" in reports["Ben"]
-    assert "It ignores where episodes end" in reports["Cleo"]
+    assert "The agent ignores where episodes end" in reports["Cleo"]
     complaints = ("too early", "too late", "and not by", "ignores", "% of what comes")
     named = {name: [x for x in complaints if x in text] for name, text in reports.items()}
     assert named["Emil"] == ["% of what comes"]

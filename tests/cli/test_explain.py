@@ -26,7 +26,7 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(expla
     assert code == 0
     assert out.startswith("drone · step 0 of the episode with seed 0\nγ = 0.95 · N = 4 · w = 1\n")
     assert out.splitlines()[-5:] == [
-        "It scored 4 in its one episode, which is the same every time.",
+        "The agent scored 4 in its one episode, which is the same every time.",
         "Down gives more immediate rewards: 2.71 in the first 4 steps, where up gives nothing.",
         "Both pay 4 in total, but each step of waiting makes a reward count 5 % less: "
         "down is worth 3.52, up 3.26.",
@@ -114,7 +114,7 @@ def test_the_story_of_an_episode_as_text_as_json_and_as_a_picture(explain):
 def test_a_calibration_as_text_and_as_json(explain):
     _, out, err = explain("gridworld:ledge", "--what", "calibration", "--N", 3, "--gamma", 0.9)
     assert out.startswith("ledge\nγ = 0.9 · N = 3 · w = 1\n")
-    assert "Its forecasts were judged by 300 episodes of 952 steps in all." in out
+    assert "The forecasts were checked on 300 episodes, 952 steps altogether." in out
     assert err == ""
     code, out, _ = explain("gridworld:ledge", "--what", "calibration", "--json", "--episodes", 50)
     data = json.loads(out)
@@ -161,7 +161,7 @@ def test_a_run_in_another_environment(explain, trained):
     same = ("--env", "trdlab/DroneGridworld-v0", "--env-arg", "slip=0.9")
     code, out, _ = explain(trained, *same, "--what", "calibration", "--episodes", 12)
     assert code == 0
-    assert "Its forecasts were judged by 12 episodes" in out
+    assert "The forecasts were checked on 12 episodes" in out
     for env, why in (
         ("trdlab/LedgeGridworld-v0", "it has 8 states, and the agent knows 14 states"),
         ("CartPole-v1", "it has 4 float32, and the agent knows 14 states"),

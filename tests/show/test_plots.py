@@ -32,13 +32,11 @@ from trdlab.explanations.moment.exact import tabular_moment
 from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty
 from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld, load_map, parse_map
-from trdlab.policies import Memoryless
-from trdlab.rollouts.episodes import collect
 from trdlab.show.plots import figure as figure_of
 from trdlab.show.plots import style
 from trdlab.show.plots.bars import CUT, plot_components
 from trdlab.show.plots.figures import explanation_figure
-from trdlab.show.plots.map import plot_map, route_taken, solved_figure
+from trdlab.show.plots.map import plot_map, solved_figure
 from trdlab.show.plots.moment import (
     moment_figure,
     plot_action,
@@ -314,25 +312,17 @@ def test_a_route_stops_before_the_treasure_that_it_leads_to():
         assert y > 2.0, "the treasure lies between 1 and 2"
 
 
-def test_the_way_that_an_episode_took_is_found_in_what_it_expected():
-    agent = gridworld_agent("bridge,slip=0.3", TimeAxis(0.95, 4))
-    table, seen = exact(agent.world.mdp, TimeAxis(0.95, 4)), []
-
-    class Watched:
-        time_axis, future = table.time_axis, table.future
-
-        def decompose(self, observations):
-            seen.append(int(observations[0]))
-            return table.decompose(observations)
-
-    (episode,) = collect(
-        Watched(),
-        agent.make(1, 3),
-        policy=Memoryless(lambda states: table.solution.policy[states]),
-        seed=3,
-    )
-    assert route_taken(table, episode) == seen
-    assert len(seen) > 5
+def test_the_way_that_an_episode_took_is_drawn_on_the_map():
+    told = explain(gridworld_agent("windy,slip=0.2", TimeAxis(0.95, 4)), ("episode",), episodes=0)
+    assert told.story is not None
+    assert isinstance(told.agent.world, Gridworld)
+    states, places = told.story.played.episode.states, told.agent.world.states
+    assert states is not None
+    assert len(states) == len(told.story.played.episode) + 1
+    (way,) = explanation_figure(told, "episode").axes[0].lines
+    x, y = way.get_data()
+    assert (y[0] - 0.5, x[0] - 0.5) == places[states[0]].place
+    assert len(x) > 5
 
 
 # ---- files, notebooks, backends ------------------------------------------------------------------

@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from by_hand import trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import tell
 from trdlab.rollouts.episodes import Episode
+from trdlab.show.plots import style
 from trdlab.show.plots.episode import plot_story, story_figure
 
 
@@ -67,14 +69,16 @@ def test_moments_are_numbered_as_their_sentences_are():
     assert [line[0] for line in lines if line[0].isdigit()] == ", ".join(marks).split(", ")
 
 
-def test_what_is_not_to_be_trusted_is_faded():
-    axis = TimeAxis(0.95, 4)
-    told = tell(played(30, axis))
-    veils = []
-    for components, residual in ((4, True), (2, False)):
-        ax, below = Figure().subplots(2, 1)
-        plot_story(ax, below, told, trusted(axis, components, residual))
-        veils.append(sum(patch.get_alpha() is not None for patch in ax.patches))
-    assert veils == [0, 3]
-    figure = story_figure(told, trust=trusted(axis, 2))
-    assert "pale: not proved, or not tested" in figure.legends[0].get_title().get_text()
+def test_beside_each_row_is_the_evidence_for_it_and_what_is_not_proved_is_pale():
+    axis = TimeAxis(0.95, 3)
+    told, trust = tell(played(30, axis)), Trust(axis, ("good", "bad", "open", "not tested"))
+    ax, below = Figure().subplots(2, 1)
+    plot_story(ax, below, told, trust)
+    beside = [patch for patch in ax.patches if not patch.get_clip_on()]
+    colours = [to_hex(patch.get_facecolor()) for patch in beside]
+    assert colours == [style.EVIDENCE[found] for found in trust.status]
+    assert len(ax.patches) - len(beside) == 3, "the pale rows"
+    figure = story_figure(told, trust=trust)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    grounds = ["better than a guess", "no better than a guess", "open, or not tested"]
+    assert labels == ["wait", *grounds]

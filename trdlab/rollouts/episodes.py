@@ -32,6 +32,7 @@ class Episode:
             the end, so that what is left out because of it does not depend on the length.
         epsilon: the chance of a random action.
         time_limit: the steps after which every such episode is truncated, if that is known.
+        states: `[T+1]`, what was observed where that is one number: the state of a finite model.
     """
 
     decomposition: RewardDecomposition
@@ -44,6 +45,7 @@ class Episode:
     random: BoolArray
     epsilon: float = 0.0
     time_limit: int | None = None
+    states: IntArray | None = None
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -103,6 +105,8 @@ class Recording:
         )
         count = environments.num_envs
         self._logs: list[list[tuple[Any, ...]]] = [[] for _ in range(count)]
+        first = self.playing.stack.observations  # [B, ...]
+        self._states = [[state] for state in first] if first.ndim == 1 else []
         self._last, self._terminated = [np.zeros(0)] * count, np.zeros(count, dtype=np.bool_)
 
     def play(
@@ -144,6 +148,8 @@ class Recording:
         seen = zip(decision.decomposition.components, decision.expected, strict=True)
         for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
             self._logs[env].append((*expectations, *(part[env] for part in happened)))
+            if self._states:
+                self._states[env].append(step.frames[env])
         if playing.finished.any():
             final = playing.at_last().expected
             for env, expected in zip(np.flatnonzero(playing.finished), final, strict=True):
@@ -175,6 +181,7 @@ class Recording:
             random=np.concatenate([random, coins]),
             epsilon=self._epsilon,
             time_limit=time_limit,
+            states=np.array(self._states[env]) if self._states else None,
         )
 
 

@@ -20,7 +20,7 @@ from trdlab.show.data import actions_data, axis_data, data, told_data
 from trdlab.show.document import Document, axis_words, document
 from trdlab.show.scenes import scene_of
 from trdlab.show.tables import Row, Table, action_table
-from trdlab.statistics import Estimate, Estimates
+from trdlab.statistics import Estimate
 
 _MOST_ROWS = 8  # of a table of components
 
@@ -120,16 +120,17 @@ def _means(comparison: Comparison) -> Table:
 
 @data.register
 def _(explanation: Explanation) -> dict[str, Any]:
-    report, trial, story = explanation.report, explanation.trial, explanation.story
+    agent, report, trial = explanation.agent, explanation.report, explanation.trial
+    story = explanation.story
     return {
         "schema": "trdlab.explain/2",
-        "agent": explanation.agent.name,
+        "agent": agent.name,
         "seed": explanation.seed,
         "step": explanation.step,
-        "seconds_per_step": explanation.agent.seconds_per_step,
+        "seconds_per_step": agent.seconds_per_step,
         "max_steps": explanation.max_steps,
         "time_axis": axis_data(explanation.time_axis),
-        "future": explanation.agent.estimator.future.to_dict(),
+        "future": agent.estimator.future.to_dict(),
         **told_data(explanation.answer, explanation.sections),
         "moment": _moment(explanation),
         "trial": None if trial is None else trial.to_dict(),
@@ -152,7 +153,7 @@ def _(comparison: Comparison) -> dict[str, Any]:
                 "name": comparison.names[i],
                 "words": list(comparison.words[i]),
                 "future": comparison.futures[i].to_dict(),
-                "mean": plain_data(_of_side(comparison.means, i)),
+                "mean": plain_data({end: of[i] for end, of in vars(comparison.means).items()}),
                 "calibration": None if report is None else data(report),
             }
             for i, (side, report) in enumerate(zip(SIDES, comparison.reports, strict=True))
@@ -169,10 +170,6 @@ def _(comparison: Comparison) -> dict[str, Any]:
         "furthest": [_state(comparison, m) for m in visits.furthest(comparing.FURTHEST)],
         **told_data(comparing.in_brief(comparison), comparing.sections(comparison)),
     }
-
-
-def _of_side(means: Estimates, side: int) -> Estimates:
-    return Estimates(means.value[side], means.low[side], means.high[side])
 
 
 def _state(comparison: Comparison, m: int) -> dict[str, Any]:

@@ -17,11 +17,7 @@ from trdlab.time_axis import TimeAxis
 
 @singledispatch
 def data(thing: Any) -> dict[str, Any]:
-    """Returns a noun of trdlab as plain data.
-
-    Raises:
-        TypeError: there is no such form of it.
-    """
+    """Returns a noun of trdlab as plain data."""
     return late(data, thing)
 
 

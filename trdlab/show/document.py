@@ -46,11 +46,7 @@ class Document:
 
 @singledispatch
 def document(thing: Any) -> Document:
-    """Returns the document about a noun of trdlab.
-
-    Raises:
-        TypeError: there is none about such a thing.
-    """
+    """Returns the document about a noun of trdlab."""
     return late(document, thing)
 
 

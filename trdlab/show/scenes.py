@@ -1,8 +1,7 @@
 """Scenes: what stands around the numbers of a solved world, and which state it is."""
 
 import math
-from dataclasses import dataclass, field
-from functools import singledispatch
+from dataclasses import dataclass
 from typing import Any
 
 from trdlab.environments.arguments import say_arguments
@@ -37,19 +36,17 @@ class Scene:
     rules: tuple[str, ...]
     drawing: str
     legend: tuple[str, ...]
-    notes: tuple[str, ...] = ()
-    world: dict[str, Any] = field(default_factory=dict)
-    state: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...]
+    world: dict[str, Any]
+    state: dict[str, Any]
 
 
-@singledispatch
 def scene_of(world: Gridworld | TabularWorld, state: int) -> Scene:
     """Returns the scene of a state of a solved world."""
-    raise TypeError(f"there is no scene of {type(world).__name__}")
+    return _on_map(world, state) if isinstance(world, Gridworld) else _in_table(world, state)
 
 
-@scene_of.register
-def _(world: Gridworld, state: int) -> Scene:
+def _on_map(world: Gridworld, state: int) -> Scene:
     grid, here = world.grid, world.states[state]
     rules = [f"slip {plain(grid.slip)}"] * bool(grid.slip)
     rules += [f"each step costs {plain(grid.step_cost)}"] * bool(grid.step_cost)
@@ -61,10 +58,8 @@ def _(world: Gridworld, state: int) -> Scene:
         rules=tuple(rules),
         drawing=ansi(world, state),
         legend=legend(world),
-        world={
-            "schema": "trdlab.gridworld/2",
-            "map": {**told, "num_states": len(world.states)},
-        },
+        notes=(),
+        world={"schema": "trdlab.gridworld/2", "map": {**told, "num_states": len(world.states)}},
         state={
             "row": here.row,
             "column": here.column,
@@ -73,8 +68,7 @@ def _(world: Gridworld, state: int) -> Scene:
     )
 
 
-@scene_of.register
-def _(world: TabularWorld, state: int) -> Scene:
+def _in_table(world: TabularWorld, state: int) -> Scene:
     mdp, here = world.mdp, world.describe(state)
     told = {k: v for k, v in world.arguments.items() if isinstance(v, bool | str)}
     notes = [_NEVER] * (not world.visited[state] and not mdp.terminal_states[state])

@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
 
 UNIT = float(np.finfo(np.float64).eps)
-ROUGH, FINE = 1e-3, 6.0 * UNIT
+ROUGH, FINE = 1e-8, 6.0 * UNIT
 """Relative changes of a pass that end a solve."""
+LEAST = 1e-300
+"""What is smaller has lost its digits."""
 
-_LEAST = 1e-300  # what is smaller has lost its digits
 _PASSES, _TOGETHER = 5, 20  # between two looks at what changes, and to extrapolate from
 _PATIENCE, _MAX_LOOKS = 40, 4_000  # looks before a factorisation is tried, and in all
 _FACTORISED_ANYWAY = 2_000  # states
@@ -181,11 +182,11 @@ class _Sparse:
         b = right[self._order]
         x = np.zeros_like(b) if start is None else start[self._order]
         mixed = bool((b > 0.0).any() and (b < 0.0).any())
-        least, before = np.full(len(b), _LEAST), np.inf
-        pause = rest = 4
+        least, before = np.full(len(b), LEAST), np.inf
+        pause = rest = 8
         for look in range(_MAX_LOOKS):
             if mixed and look % 4 == 0:  # what cancels is not known better than what it is made of
-                least = np.maximum(np.abs(b) + self._matrix @ np.abs(x), _LEAST)
+                least = np.maximum(np.abs(b) + self._matrix @ np.abs(x), LEAST)
             if rest:
                 for _ in range(_PASSES):
                     x, last = self._pass(b, x), x
@@ -279,8 +280,13 @@ def _factorised(matrix: "csr_array", order: str) -> "SuperLU":
     from scipy.sparse.linalg import splu
 
     try:
-        options = {"SymmetricMode": True}
-        return splu(matrix.T.tocsc(), permc_spec=order, diag_pivot_thresh=0.0, options=options)
+        return splu(
+            matrix.T.tocsc(),
+            permc_spec=order,
+            diag_pivot_thresh=0.0,
+            panel_size=1 if order == "NATURAL" else None,  # nothing fills in
+            options={"SymmetricMode": True},
+        )
     except RuntimeError as error:  # the system is singular
         raise endless() from error
 

@@ -113,7 +113,7 @@ def test_a_reward_shifted_by_one_step_is_named(name: str, seed: int):
         seed=seed,
     )
     (fault,) = diagnosed(episodes)
-    assert fault.sentence == "It expects rewards 1 step too early."
+    assert fault.sentence == "The agent expects rewards 1 step too early."
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -182,9 +182,11 @@ def test_a_young_agent_expects_too_little_and_nothing_too_early(horizon, lengths
 def test_what_a_young_agent_is_told():
     report = young(8, (10, 10), 0.01, 0)
     late, share = (*off_from(report), *amount_off(report))
-    assert late.sentence.startswith("It expects too little of what comes 3 to 7 steps later: ")
+    assert late.sentence.startswith(
+        "The agent expects too little of what comes 3 to 7 steps later: "
+    )
     assert late.sentence.endswith(" on average, where 1.56 came.")
-    assert share.sentence == "In the first 8 steps it expects 61 % of what comes."
+    assert share.sentence == "In the first 8 steps the agent expects 61 % of what comes."
 
 
 # ---- steps that fit each other -------------------------------------------------------------------

@@ -100,7 +100,7 @@ def test_what_came_on_the_ledge_agrees_with_the_exact_values():
     assert inside.all()
     in_all, now, later, often = (claim.sentence for claim in told(trial))
     assert in_all.startswith(
-        "Trying each 500 times was too few to tell whether right is worth more than up; about "
+        "500 tries of each are too few to tell whether right is worth more than up; about "
     )
     assert now.startswith("As forecast, 2 steps later right paid 0.6")
     assert now.endswith("more than up; 0.658 was forecast.")
@@ -157,8 +157,10 @@ def test_a_false_promise_is_found_out():
     trial = try_out(agent, "right", "up", copies=100)
     false = next(claim for claim in told(trial) if claim.kind == "against-the-forecast")
     assert (false.more, false.less, false.component) == ("up", "right", 2)
-    assert false.sentence.startswith("Against the forecast, 2 steps later right paid 0.6")
-    assert false.sentence.endswith("more than up; up was to be 1.34 ahead.")
+    assert false.sentence.startswith(
+        "The forecast was wrong: up was to be 1.34 ahead, but 2 steps later right paid 0.6"
+    )
+    assert false.sentence.endswith(" more.")
 
 
 def test_less_than_was_promised_is_found_out_too():

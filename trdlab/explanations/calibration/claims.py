@@ -23,7 +23,7 @@ LITTLE = 0.1
 WORTH_SAYING = 0.005
 """A smaller share is not said."""
 
-OWN, OTHERS = "its forecasts", "its forecasts for other actions"
+OWN, OTHERS = "its forecasts", "forecasts for actions not chosen"
 
 Found = Iterator[tuple[str, Fields]]
 
@@ -33,12 +33,14 @@ Found = Iterator[tuple[str, Fields]]
 @REPORTS.kinds(
     {
         "scored-once": (
-            "It scored {returns:number} in its one episode, which is the same every time."
+            "The agent scored {returns:number} in its one episode, which is the same every time."
         ),
-        "scored-always": "It scored {returns:number} in each of {episodes:episodes}.",
-        "scored-few": "It scored {returns:number} an episode on average over {episodes:episodes}.",
+        "scored-always": "The agent scored {returns:number} in each of {episodes:episodes}.",
+        "scored-few": (
+            "Over {episodes:episodes} the agent scored {returns:number} each, on average."
+        ),
         "scored": (
-            "It scored {returns:number} an episode on average over {episodes:episodes}; the true "
+            "Over {episodes:episodes} the agent scored {returns:number} each, on average; the true "
             "average is likely {low:number} to {high:number}."
         ),
     }
@@ -56,7 +58,7 @@ def scores(report: CalibrationReport) -> Found:
         yield "scored-few", scored
 
 
-@REPORTS.rule("{ended:text} of them ended before the limit of {limit:steps}.")
+@REPORTS.rule("{ended:text} of these episodes ended before the limit of {limit:steps}.")
 def some_ended(report: CalibrationReport) -> Iterator[Fields]:
     score = report.score
     if score.truncated and score.time_limit is not None:
@@ -160,16 +162,16 @@ def _in_short(claims: list[Claim]) -> list[Claim]:
             "may share their chance."
         ),
         "cannot-be-known": (
-            "Chance decides what comes {component:when}: even a perfect forecast has at most "
-            "{at_most:percent} less error than a guess."
+            "Chance decides what comes {component:when}: even a perfect forecast would beat a "
+            "guess by at most {at_most:percent}."
         ),
         "is-not-known": (
-            "More can be known of what comes {component:when}: a perfect forecast removes "
-            "{ceiling:percent} of a guess's error, this one {removes:text}."
+            "More can be known of what comes {component:when}: a perfect forecast would beat a "
+            "guess by {ceiling:percent}, this one by {margin:text}."
         ),
         "as-good-as-can-be": (
-            "Of a guess's error about what comes {component:when} it removes {skill:percent}, "
-            "about as much as a perfect forecast."
+            "About what comes {component:when}, its forecasts beat a guess by {skill:percent}, "
+            "about as much as can be."
         ),
     }
 )
@@ -185,8 +187,8 @@ def limits(report: CalibrationReport) -> Found:
         if limit.high < LITTLE:
             yield "cannot-be-known", {"component": at, "at_most": max(limit.high, 0.0)}
         elif skill.high < limit.low:
-            removes = f"{percent(skill.value)} %" if skill.value > 0.0 else "nothing"
-            yield "is-not-known", about | {"removes": removes}
+            margin = f"{percent(skill.value)} %" if skill.value > 0.0 else "nothing"
+            yield "is-not-known", about | {"margin": margin}
         elif limit.low > 0.0 and skill.low > 0.0:
             yield "as-good-as-can-be", about
 
@@ -203,7 +205,8 @@ def _known(report: CalibrationReport) -> list[Claim]:
 @REPORTS.kinds(
     {
         "expects-later": (
-            "{share:percent} of what it expects comes {component:when}; it does not say when."
+            "{share:percent} of what the agent expects comes {component:when}; it does not say "
+            "when."
         ),
         "differs-later": (
             "{share:percent} of what sets its best action apart from the next best comes "
@@ -233,8 +236,8 @@ def would_suffice(report: CalibrationReport) -> Iterator[Fields]:
 
 @REPORTS.kinds(
     {
-        "judged-by": "Its forecasts were judged by {episodes:episodes} of {steps:steps} in all.",
-        "cut-off": "{cut:episodes} of these {were:text} cut off.",
+        "judged-by": "The forecasts were checked on {episodes:episodes}, {steps:steps} altogether.",
+        "cut-off": "{cut:count} of these episodes {were:text} cut off.",
         "lives": "Lives were lost {count:times} in them; for its forecasts {ends:text}.",
         "some-random": (
             "{share:percent} of the actions in them were random; what followed one is not held "

@@ -37,21 +37,22 @@ REPORTS = Language[CalibrationReport]("this report", _forms)
 # ---- timing and amount ---------------------------------------------------------------------------
 
 
-@REPORTS.rule("It expects rewards {steps:steps} too {late:text}.")
+@REPORTS.rule("The agent expects rewards {steps:steps} too {late:text}.")
 def mistimed(report: CalibrationReport) -> Iterator[Fields]:
     if report.errors is not None and (shift := report.errors.shift):
         late = "late" if shift > 0 else "early"
         yield {"steps": abs(shift) * report.time_axis.width, "late": late}
 
 
-@REPORTS.rule("{span:span} it expects {share:percent} of what comes.")
+@REPORTS.rule("{span:span} the agent expects {share:percent} of what comes.")
 def amount_off(report: CalibrationReport) -> Iterator[Fields]:
     if report.errors is not None and is_off(report.errors.amount):
         yield {"span": (0, report.time_axis.horizon - 1), "share": report.errors.amount.value}
 
 
 @REPORTS.rule(
-    "It expects {amount:text} of {span:comes}: {said:number} on average, where {came:number} came."
+    "The agent expects {amount:text} of {span:comes}: {said:number} on average, where "
+    "{came:number} came."
 )
 def off_from(report: CalibrationReport) -> Iterator[Fields]:
     """Near components are not surely off by a tenth; all others are, to the same side."""
@@ -71,7 +72,8 @@ def off_from(report: CalibrationReport) -> Iterator[Fields]:
 
 
 @REPORTS.rule(
-    "It spreads rewards over the steps before and after, more than their timing is uncertain."
+    "The agent spreads rewards over the steps before and after, more than their timing is "
+    "uncertain."
 )
 def smeared(report: CalibrationReport) -> Iterator[Fields]:
     if report.errors is not None and report.errors.smear.low > LEAST_SMEAR and not faults(report):
@@ -81,12 +83,12 @@ def smeared(report: CalibrationReport) -> Iterator[Fields]:
 @REPORTS.kinds(
     {
         "overestimates": (
-            "It expects up to {said:number}: too much, for at most {most:number} can come if no "
-            "step pays more than {reward:number}, the most seen."
+            "The agent expects up to {said:number}: too much, for at most {most:number} can come "
+            "if no step pays more than {reward:number}, the most seen."
         ),
         "underestimates": (
-            "It expects as little as {said:number}: too little, for at least {least:number} comes "
-            "if no step pays less than {reward:number}, the least seen."
+            "The agent expects as little as {said:number}: too little, for at least {least:number} "
+            "comes if no step pays less than {reward:number}, the least seen."
         ),
     }
 )
@@ -108,7 +110,8 @@ def beyond(report: CalibrationReport) -> Iterator[tuple[str, Fields]]:
 
 
 @REPORTS.rule(
-    "It discounts what comes {width:steps} later by {measured:number}, and not by {right:number}."
+    "The agent discounts what comes {width:steps} later by {measured:number}, and not by "
+    "{right:number}."
 )
 def discount_off(report: CalibrationReport) -> Iterator[Fields]:
     axis = report.time_axis
@@ -117,7 +120,9 @@ def discount_off(report: CalibrationReport) -> Iterator[Fields]:
         yield {"width": axis.width, "measured": measured, "right": right}
 
 
-@REPORTS.rule("It ignores where episodes end: it counts in {share:percent} of what {what:text}.")
+@REPORTS.rule(
+    "The agent ignores where episodes end: it counts in {share:percent} of what {what:text}."
+)
 def end_ignored(report: CalibrationReport) -> Iterator[Fields]:
     found = report.consistency
     if found is not None and found.explained >= EXPLAINED and found.past_end.low > 0.5:

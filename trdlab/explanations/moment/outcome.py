@@ -102,18 +102,18 @@ _MORE = "{component:at}{more} {component:paid} %s more than {less}"
             f"{_MORE % 'at most {most:number}'}, less than the {{said:number}} that was forecast."
         ),
         "against-the-forecast": (
-            "Against the forecast, {component:at}{less} {component:paid} {ahead:estimate} more "
-            "than {more}; {more} was to be {said:number} ahead."
+            "The forecast was wrong: {more} was to be {said:number} ahead, but "
+            "{component:at}{less} {component:paid} {ahead:estimate} more."
         ),
         "no-difference": (
-            f"Against the forecast, {_MORE % 'no'}; {{said:number}} more was forecast."
+            f"The forecast was wrong: {_MORE % 'no'}, where {{said:number}} more was forecast."
         ),
         "too-few-tries": (
-            "Trying each {copies:times} was too few to tell whether {component:at}{more} "
+            "{copies:count} tries of each are too few to tell whether {component:at}{more} "
             "{component:pays} more than {less}; about {enough:count} would do."
         ),
         "too-close-to-tell": (
-            "Trying cannot tell whether {component:at}{more} {component:pays} more than {less}: "
+            "Tries cannot tell whether {component:at}{more} {component:pays} more than {less}: "
             "they are too close."
         ),
     }

@@ -3,6 +3,7 @@
 The scale is that of the bars. What does not fit on it ends at an arrow with its number.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -76,10 +77,9 @@ def scale_of(rows: FloatArray, *ends: FloatArray | None) -> Scale:
     others = others[np.isfinite(others)]
     near = others[np.abs(others) <= _REACH * tallest] if tallest else others
     low, high = min(0.0, *bars.flat, *near), max(0.0, *bars.flat, *near)
-    goes_below, goes_above = (others < low).any(), (others > high).any()
     return Scale(
-        min(low, -_ROOM * tallest) if goes_below else low,
-        max(high, _ROOM * tallest) if goes_above else high,
+        min(low, -_ROOM * tallest) if (others < low).any() else low,
+        max(high, _ROOM * tallest) if (others > high).any() else high,
     )
 
 
@@ -97,14 +97,11 @@ def plot_components(
     at an arrow.
 
     Args:
-        ax: the axes to draw on.
+        ax: the axes to draw on; they are returned.
         components: `[N+1]`.
         axis: what they mean.
         colour: of the bars; of a difference, that of positive and that of negative ones.
         scale: what the axes show; by default all that is drawn.
-
-    Returns:
-        `ax`.
     """
     components = settled(components)
     scale = scale_of(components[None]) if scale is None else scale
@@ -139,7 +136,7 @@ def draw_bars(
     ax: Axes,
     components: FloatArray,
     axis: TimeAxis,
-    colours: list[str],
+    colours: Sequence[str],
     scale: Scale,
     *,
     told: bool = False,
@@ -168,9 +165,9 @@ def draw_whiskers(
     gone = (ends[0] > scale.high) | (ends[1] < scale.low)  # all of it, on one side
     far = np.abs(ends).argmax(axis=0)  # [K]
     for which, row in enumerate(ends):
-        inside, out = scale.holds(row), np.flatnonzero(~scale.holds(row))
+        inside = scale.holds(row)
         ax.plot(x[inside], row[inside], "_", color=style.INK, markersize=5, zorder=4)
-        out = out[~gone[out] | (far[out] == which)]  # then its far end alone
+        out = np.flatnonzero(~inside & (~gone | (far == which)))  # of what is gone its far end
         telling = out if len(out) <= _MOST_CUTS else out[[np.abs(row[out]).argmax()]]
         for i in out:
             _cut(ax, x[i], row[i], scale, style.INK, is_told=i not in telling)

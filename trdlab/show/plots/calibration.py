@@ -38,11 +38,10 @@ def trust_figure(report: CalibrationReport, title: str = "") -> Figure:
 def plot_trust(ax: Axes, report: CalibrationReport) -> Axes:
     """Draws the skill of every component with its interval on `ax`, which is returned.
 
-    The ground of a component is green where it has proved better than a constant guess, red where
-    it is surely not, and grey where that is open or was not tested. Where there was nothing to
-    predict stands a small ring on the line of no skill; where nothing is known or too few episodes
-    tell, a cross. The ceiling, if there is one, is a dashed line: what lies above it cannot be
-    known.
+    The ground is green where it has proved better than a constant guess, red where it is surely
+    not, and grey where that is open or was not tested. Where there was nothing to predict stands a
+    ring on the line of no skill; where nothing was tested, a cross. The ceiling, if there is one,
+    is a dashed line: what lies above it cannot be known.
     """
     found, x = report.calibration, style.positions(report.time_axis, 1.0)
     style.draw_grounds(ax, x, found.status)

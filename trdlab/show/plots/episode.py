@@ -1,7 +1,8 @@
 """An episode: what was done, what was expected all along, and the rewards that came."""
 
 from itertools import groupby, pairwise
-from typing import Any, Literal
+from textwrap import wrap
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,14 +18,14 @@ from trdlab.explanations.episode.story import Story, place
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.render import draw_map
 from trdlab.show.plots import style
-from trdlab.show.plots.map import map_height, plot_route, route_taken
-from trdlab.tabular import ExactTable
+from trdlab.show.plots.map import map_height, plot_route
 from trdlab.time_axis import axis_title
 
 _SHADES = (style.COST, "#ffffff", style.EXPECTED)
 _COLOURS = LinearSegmentedColormap.from_list("costs to rewards", _SHADES)
 _REWARDS = LinearSegmentedColormap.from_list("rewards", _SHADES[1:])
 _VEIL = 0.6  # of white, over what is not to be trusted
+_BESIDE = (-0.04, -0.01)  # of the axes: where the evidence for a row is shown
 _HARDLY = 0.02  # negative values below this share of the largest need no colour of their own
 _MOST_LABELS = 8
 _MOST_DOTS = 60
@@ -37,12 +38,7 @@ _MAP = 0.75  # of the height that a map has elsewhere
 
 @style.settings()
 def story_figure(
-    told: Story,
-    title: str = "",
-    *,
-    trust: Trust | None = None,
-    world: Gridworld | None = None,
-    table: ExactTable | None = None,
+    told: Story, title: str = "", *, trust: Trust | None = None, world: Gridworld | None = None
 ) -> Figure:
     """Returns the picture of an episode; the sentence of each key moment stands below it.
 
@@ -51,33 +47,30 @@ def story_figure(
         title: of the picture.
         trust: how far such forecasts can be trusted, if that is known.
         world: the gridworld it was played in; its map is drawn, with the way that was taken.
-        table: the exact table of that world.
     """
-    played = told.played
-    lines = [f"{number}  {claim.sentence}" for number, claim in enumerate(told.moments, 1)]
-    states = None if table is None else route_taken(table, played.episode)
+    played, states = told.played, told.played.episode.states
+    says = (f"{number}  {claim.sentence}" for number, claim in enumerate(told.moments, 1))
+    lines = [line for sentence in says for line in wrap(sentence, style.LETTERS)]
+    handles = _handles(played) + style.ground_handles(() if trust is None else trust.status)
     top = 0.0 if world is None or states is None else _MAP * map_height(world)
-    height = 4.8 + top + sum(_LINE * -(-len(line) // style.LETTERS) for line in lines)
-    figure = style.new_figure(height, title)
+    figure = style.new_figure(4.6 + top + _LINE * (len(lines) + len(handles) / 2), title)
     ratios = [*[top] * bool(top), 0.3, 2.4, 0.9]
     *maps, strip, ax, below = figure.subplots(len(ratios), 1, height_ratios=ratios)
     if world is not None and states is not None:
-        plot_route(draw_map(maps[0], world, states[0]), world, states)
+        plot_route(draw_map(maps[0], world, states[0]), world, states.tolist())
     plot_actions(strip, played)
     plot_story(ax, below, told, trust)
     extend = _extend(played.episode.predicted)
     bar = figure.colorbar(ax.images[-1], ax=ax, pad=0.02, aspect=14, extend=extend)
     bar.ax.tick_params(labelsize=style.TEXT)
-    is_pale = trust is not None and bool(trust.doubtful.any())
-    note = axis_title(played.episode.time_axis) + " · pale: not proved, or not tested" * is_pale
-    style.add_legend(figure, _handles(played), *lines, note)
+    style.add_legend(figure, handles, *lines, axis_title(played.episode.time_axis))
     return figure
 
 
 def plot_actions(ax: Axes, played: Played) -> Axes:
-    """Draws the action of each step in its colour, by name where there is room.
+    """Draws the action of each step in its colour on `ax`, which is returned.
 
-    `ax` is returned.
+    Names stand where there is room.
     """
     actions, names, begin = played.episode.actions, played.action_names, 0
     colours, box = style.action_colours(names), {"fc": "white", "ec": "none", "alpha": 0.75}
@@ -97,23 +90,18 @@ def plot_actions(ax: Axes, played: Played) -> Axes:
 def plot_story(ax: Axes, below: Axes, told: Story, trust: Trust | None = None) -> Axes:
     """Draws what was expected at each step, the rewards that came, and the numbered key moments.
 
-    Above, a column is a step of the episode, and a row is how many steps ahead; the residual stands
-    apart on top. A reward that is expected at its right step runs down a diagonal until it comes.
-    What is not to be trusted is pale.
-
-    Args:
-        ax: the axes of what was expected.
-        below: the axes of the rewards, with the same steps.
-        told: the story.
-        trust: how far such forecasts can be trusted, if that is known.
-
-    Returns:
-        `ax`; its images are in discounted reward, for a colour bar.
+    On `ax`, which is returned, a column is a step of the episode, and a row is how many steps
+    ahead; the residual stands apart on top. A reward that is expected at its right step runs down a
+    diagonal until it comes: on `below`, with the same steps. Beside each row is the evidence for
+    it; what has not proved better than a guess is pale. The images of `ax` are in discounted
+    reward, for a colour bar.
     """
     _plot_expected(ax, told, trust)
     _plot_rewards(below, told)
     _mark_moments(ax, below, told)
-    _mark_ends(ax, below, told)
+    for panel in (ax, below):
+        for step in np.flatnonzero(told.played.episode.ends):  # nothing was left to come
+            panel.axvline(step + 0.5, color=style.INK, linewidth=1.2, zorder=3, clip_on=False)
     return ax
 
 
@@ -136,18 +124,22 @@ def _plot_expected(ax: Axes, told: Story, trust: Trust | None) -> None:
         steps, rows = block.shape
         extent = (-0.5, steps - 0.5, bottom - 0.5, bottom + rows - 0.5)
         ax.imshow(block.T, origin="lower", extent=extent, aspect="auto", **how)
-    for row, is_doubtful in enumerate(() if trust is None else trust.doubtful):
-        if is_doubtful:
-            at = row if row < horizon else top
-            ax.axhspan(at - 0.5, at + 0.5, color="white", alpha=_VEIL, linewidth=0, zorder=2)
+    for row, found in enumerate(() if trust is None else trust.status):
+        at = row if row < horizon else top
+        ends, look = (at - 0.5, at + 0.5), {"linewidth": 0, "zorder": 2}
+        ax.axhspan(*ends, *_BESIDE, color=style.EVIDENCE[found], clip_on=False, **look)
+        if found != "good":
+            ax.axhspan(*ends, color="white", alpha=_VEIL, **look)
     shown = [*range(0, horizon, -(-max(horizon, 1) // _MOST_LABELS)), horizon]
     ax.set_yticks([*shown[:-1], top], [axis.label(row) for row in shown])
     ax.set(xlim=(-0.5, len(expected) - 0.5), ylim=(-0.5, top + 0.5), ylabel="expected at")
     style.tidy(ax).tick_params(labelbottom=False)
+    if trust is not None:
+        ax.tick_params(axis="y", length=0, pad=16)
 
 
 def _plot_rewards(ax: Axes, told: Story) -> None:
-    rewards = told.played.episode.rewards
+    rewards, is_over = told.played.episode.rewards, told.played.episode.terminated
     at = np.flatnonzero(rewards)
     ax.vlines(at, 0.0, rewards[at], color=style.INK, linewidth=1.5 if at.size < 200 else 0.6)
     for marker, some in (("o", at[rewards[at] > 0.0]), ("v", at[rewards[at] < 0.0])):
@@ -161,7 +153,8 @@ def _plot_rewards(ax: Axes, told: Story) -> None:
     ax.set(xlim=(-0.5, len(rewards) - 0.5), ylabel="reward", xlabel="step of the episode")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
     ax.yaxis.set_major_locator(MaxNLocator(nbins=3))
-    style.tidy(ax)
+    how: Any = {"fontsize": style.TEXT, "color": style.MUTED, "pad": 2.0}
+    style.tidy(ax).set_title("ended" if is_over else "cut off", loc="right", **how)
 
 
 def _mark_moments(ax: Axes, below: Axes, told: Story) -> None:
@@ -185,31 +178,19 @@ def _mark_moments(ax: Axes, below: Axes, told: Story) -> None:
             style.note(ax, text, at, (0, 3), **how)
 
 
-def _mark_ends(ax: Axes, below: Axes, told: Story) -> None:
-    """Draws a line where nothing was left to come, and says how the episode ended."""
-    episode = told.played.episode
-    for step in np.flatnonzero(episode.ends):
-        for panel in (ax, below):
-            panel.axvline(step + 0.5, color=style.INK, linewidth=1.2, zorder=3, clip_on=False)
-    how: Any = {"fontsize": style.TEXT, "color": style.MUTED, "pad": 2.0}
-    below.set_title("ended" if episode.terminated else "cut off", loc="right", **how)
-
-
 def _limits(expected: FloatArray) -> tuple[float, float]:
     """Returns the values `[T, N+1]` that the colours end at: those of the explicit components."""
-    values = expected[:, :-1] if expected.shape[1] > 1 else expected
-    largest = float(np.abs(values).max()) or float(np.abs(expected).max()) or 1.0
+    largest = float(np.abs(expected[:, :-1]).max(initial=0.0)) or float(np.abs(expected).max())
     has_costs = float(expected.min()) < -_HARDLY * largest
-    return (-largest if has_costs else 0.0), largest
+    return (-largest if has_costs else 0.0), largest or 1.0
 
 
-def _extend(expected: FloatArray) -> Literal["neither", "both", "min", "max"]:
+def _extend(expected: FloatArray) -> Any:
     """Returns at which ends of the colour bar the residual goes on."""
     low, high = _limits(expected)
-    below, above = expected[:, -1].min() < low - _HARDLY * high, expected[:, -1].max() > high
-    if below and above:
-        return "both"
-    return "min" if below else "max" if above else "neither"
+    ends = expected[:, -1].min() < low - _HARDLY * high, expected[:, -1].max() > high
+    names = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    return names.get(ends, "neither")
 
 
 def _residual_row(horizon: int) -> float:

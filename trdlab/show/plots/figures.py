@@ -1,7 +1,7 @@
 """The picture of each noun, and the pictures of an explained agent, one for each part."""
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from trdlab.show.plots.moment import moment_figure, possible_range
 from trdlab.tabular import ExactTable
 
 
+@singledispatch
 def figure(thing: Any, **how: Any) -> Figure:
     """Returns the picture of a thing: what its `.plot()` shows.
 
@@ -34,13 +35,11 @@ def figure(thing: Any, **how: Any) -> Figure:
     Raises:
         InputError: there is no picture of such a thing.
     """
-    for cls in type(thing).__mro__:
-        if cls in _FIGURES:
-            return _FIGURES[cls](thing, **how)
-    known = ", ".join(sorted(cls.__name__ for cls in _FIGURES))
+    known = ", ".join(sorted(cls.__name__ for cls in figure.registry if cls is not object))
     raise InputError(f"There is no picture of a {type(thing).__name__}.", f"Draw one of: {known}.")
 
 
+@figure.register
 def explanation_figure(explained: Explanation, part: Part | None = None) -> Figure:
     """Returns the picture of a part, by default of the first one there is.
 
@@ -85,25 +84,21 @@ def _episode(explained: Explanation, told: Story) -> Figure:
         told,
         f"{agent.name}, the episode with seed {explained.seed}",
         trust=None if report is None else report.trust,
-        world=agent.world if isinstance(agent.world, Gridworld) else None,
-        table=agent.estimator if isinstance(agent.estimator, ExactTable) else None,
+        world=agent.world if isinstance(agent.world, Gridworld) and not agent.is_away else None,
     )
 
 
-def _of_table(table: ExactTable, **how: Any) -> Figure:
+@figure.register
+def _(table: ExactTable, **how: Any) -> Figure:
     names = [f"action {i}" for i in range(table.mdp.num_actions)]
     return figure(moment_of(table, table.mdp.start, names), **how)
 
 
-_FIGURES: dict[type, Callable[..., Figure]] = {
-    Comparison: comparison_figure,
-    ExactTable: _of_table,
-    Explanation: explanation_figure,
-    Choice: moment_figure,
-    Gridworld: world_figure,
-    Moment: lambda of, **how: figure(of.choice(), **how),
-    Played: lambda of, **how: story_figure(tell(of), **how),
-    SolvedState: solved_figure,
-    Story: story_figure,
-    CalibrationReport: trust_figure,
-}
+figure.register(CalibrationReport, trust_figure)
+figure.register(Choice, moment_figure)
+figure.register(Comparison, comparison_figure)
+figure.register(Gridworld, world_figure)
+figure.register(Moment, lambda moment, **how: moment_figure(moment.choice(), **how))
+figure.register(Played, lambda played, **how: story_figure(tell(played), **how))
+figure.register(SolvedState, solved_figure)
+figure.register(Story, story_figure)

@@ -17,17 +17,8 @@ from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.gridmap import MOVES
 from trdlab.gridworld.render import ABOVE_ROUTES, draw_map
-from trdlab.rollouts.episodes import Episode
 from trdlab.show.plots import bars, style
-from trdlab.show.plots.moment import (
-    EXPECTED,
-    PANEL,
-    explain_marks,
-    names_of,
-    plot_moment,
-    possible_range,
-    without_noise,
-)
+from trdlab.show.plots.moment import moment_figure, names_of, possible_range, without_noise
 from trdlab.show.scenes import Scene, scene_of
 from trdlab.tabular import ExactTable
 
@@ -36,27 +27,26 @@ _LINES, _LANES = ("-", (0, (2.2, 1.0))), (-0.12, 0.12)  # of the action's route 
 _TALLEST = 3.2  # inches
 
 
-@style.settings()
 def solved_figure(solved: SolvedState) -> Figure:
     """Returns the picture of a solved world: its map, and below it the bars of a state."""
-    choice, world, scene = solved.choice, solved.world, scene_of(solved.world, solved.state)
-    if isinstance(world, Gridworld):
-        top = map_height(world)
-    else:
-        top = 0.2 * max(1.6 * len(scene.drawing.splitlines()), 3.0 + len(scene.legend))
-    panels = 1 if choice.foil is None else 3
-    figure = style.new_figure(1.6 + top + PANEL * panels, scene.caption)
-    first, *rest = figure.subplots(1 + panels, 1, height_ratios=(top, *(PANEL,) * panels))
-    if isinstance(world, Gridworld):
-        plot_map(first, world, solved.table, solved.state, names_of(choice))
-    else:
-        plot_scene(first, scene, solved.state)
-    bound = float(solved.table.solution.error_bound[solved.state].max())
-    choice = replace(choice, moment=without_noise(choice.moment, bound))
-    plot_moment(rest, choice, possible=possible_range(solved.table))
-    rest[len(rest) // 2].set_ylabel(EXPECTED)
-    explain_marks(figure, choice)
-    return figure
+    choice, world, state = solved.choice, solved.world, solved.state
+    scene = scene_of(world, state)
+
+    def draw(ax: Axes) -> None:
+        if isinstance(world, Gridworld):
+            plot_map(ax, world, solved.table, state, names_of(choice))
+        else:
+            plot_scene(ax, scene, state)
+
+    words = max(1.6 * len(scene.drawing.splitlines()), 3.0 + len(scene.legend))
+    height = map_height(world) if isinstance(world, Gridworld) else 0.2 * words
+    bound = float(solved.table.solution.error_bound[state].max())
+    return moment_figure(
+        replace(choice, moment=without_noise(choice.moment, bound)),
+        scene.caption,
+        possible=possible_range(solved.table),
+        above=(height, draw),
+    )
 
 
 @style.settings()
@@ -76,17 +66,9 @@ def map_height(world: Gridworld) -> float:
 def plot_map(
     ax: Axes, world: Gridworld, table: ExactTable, state: int, actions: Sequence[str]
 ) -> Axes:
-    """Draws a state of a gridworld, the policy, and the route that each action leads to.
+    """Draws a state of a gridworld on `ax`, which is returned, with the policy and routes.
 
-    A route follows the likeliest outcome of the action, then of the policy's likeliest actions,
-    until the episode ends or comes back to where it was.
-
-    Args:
-        ax: the axes to draw on; they are returned.
-        world: the gridworld.
-        table: its table; the routes follow its policy.
-        state: the index of the state.
-        actions: the names of one or two; the route of the second is dashed.
+    There is a `route` after each of one or two `actions`; that after the second is dashed.
     """
     draw_map(ax, world, state)
     _draw_policy(ax, world, table, state)
@@ -122,7 +104,7 @@ def plot_route(
         lane: how far beside the middle of the cells it goes.
 
     Returns:
-        The line that was drawn.
+        The line.
     """
     places = [place for place, _ in groupby(world.states[state].place for state in states)]
     points = np.array(places, dtype=np.float64)[:, ::-1] + 0.5 + lane  # [K, 2] of x, y
@@ -133,9 +115,8 @@ def plot_route(
             points[-1] -= 0.53 * ahead + lane * np.abs(ahead)
         head = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 14, "linewidth": 0}
         head |= {"shrinkA": 0, "shrinkB": 0}
-        ax.annotate(
-            "", points[-1], points[-1] - 0.3 * ahead, arrowprops=head, zorder=ABOVE_ROUTES + 1.0
-        )
+        way = points[-1], points[-1] - 0.3 * ahead
+        ax.annotate("", *way, arrowprops=head, zorder=ABOVE_ROUTES + 1.0)
         points[-1] -= 0.1 * ahead
     (drawn,) = ax.plot(*points.T, color=colour, linestyle=line, linewidth=2.5, zorder=3)
     return drawn
@@ -153,46 +134,18 @@ def plot_scene(ax: Axes, scene: Scene, state: int) -> Axes:
 
 def route(table: ExactTable, state: int, action: int) -> list[int]:
     """Returns the states of the likeliest episode that begins with an action, until it repeats."""
-    mdp, policy = table.mdp, table.solution.policy
-    states = [state]
+    mdp, policy, states = table.mdp, table.solution.policy, [state]
     for _ in range(_MOST_ROUTE_STEPS):
         row = states[-1] * mdp.num_actions + action
         outcomes = slice(mdp.offsets[row], mdp.offsets[row + 1])
         likeliest = mdp.offsets[row] + int(mdp.probabilities[outcomes].argmax())
         following = int(mdp.next_states[likeliest])
-        ended = bool(mdp.terminated[likeliest])
         if following in states[1:]:
             return [*states, following]
-        if following != states[-1]:
-            states.append(following)
-        if ended:
+        states += [following] * (following != states[-1])
+        if mdp.terminated[likeliest]:
             break
         action = int(policy[following].argmax())
-    return states
-
-
-def route_taken(table: ExactTable, episode: Episode) -> list[int] | None:
-    """Returns the states that an episode of a model went through; None if that cannot be told.
-
-    Episodes keep what was expected, not what was seen: of the states that an action can lead to,
-    that one is taken of which the same was expected.
-    """
-    mdp, components = table.mdp, table.decomposition.components
-    states = [mdp.start]
-    for step, action in enumerate(episode.actions):
-        row, is_last = states[-1] * mdp.num_actions + action, step + 1 == len(episode)
-        outcomes = np.arange(mdp.offsets[row], mdp.offsets[row + 1])
-        fits = (mdp.probabilities[outcomes] > 0.0) & (
-            mdp.terminated[outcomes] == (is_last and episode.terminated)
-        )
-        fits &= np.isclose(mdp.rewards[outcomes], episode.rewards[step])
-        following = np.unique(mdp.next_states[outcomes[fits]])
-        if not is_last:
-            seen = episode.decomposition.components[step + 1]  # [A, N+1]
-            following = following[(components[following] == seen).all(axis=(1, 2))]
-        if len(following) != 1:
-            return None
-        states.append(int(following[0]))
     return states
 
 

@@ -1,6 +1,6 @@
 """What is expected of actions at one moment: bars, what they can be off by, and the difference."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,25 +22,34 @@ from trdlab.time_axis import axis_title
 
 __all__ = ["moment_figure", "plot_action", "plot_components", "plot_contrast", "plot_moment"]
 
-Range = tuple[float, float]
-"""The least and the largest value that is possible."""
+Range = tuple[float, float]  # the least and the largest value that is possible
 ANY: Range = (-np.inf, np.inf)
-PANEL = 1.75
-"""Inches that one row of bars takes."""
-EXPECTED = "expected discounted reward"
+
+_PANEL = 1.75  # inches that one row of bars takes
 
 
 @style.settings()
 def moment_figure(
-    choice: Choice, title: str = "", *, trial: Trial | None = None, possible: Range = ANY
+    choice: Choice,
+    title: str = "",
+    *,
+    trial: Trial | None = None,
+    possible: Range = ANY,
+    above: tuple[float, Callable[[Axes], object]] | None = None,
 ) -> Figure:
-    """Returns the picture of an action, or of two and their difference (see `plot_moment`)."""
-    panels = 1 if choice.foil is None else 3
-    figure = style.new_figure(1.6 + PANEL * panels, title)
-    axes = np.atleast_1d(figure.subplots(panels, 1, sharex=True)).tolist()
+    """Returns the picture of an action, or of two and their difference (see `plot_moment`).
+
+    With `above`, something else is drawn at the top: how many inches it takes, and what draws it.
+    """
+    heights = [_PANEL] * (1 if choice.foil is None else 3)
+    heights[:0] = () if above is None else above[:1]
+    figure = style.new_figure(1.6 + sum(heights), title)
+    axes = np.atleast_1d(figure.subplots(len(heights), 1, height_ratios=heights)).tolist()
+    if above is not None:
+        above[1](axes.pop(0))
     plot_moment(axes, choice, trial=trial, possible=possible)
-    figure.supylabel(EXPECTED, fontsize=style.TEXT, color=style.MUTED)
-    explain_marks(figure, choice, trial)
+    axes[len(axes) // 2].set_ylabel("expected discounted reward")
+    _explain_marks(figure, choice, trial)
     return figure
 
 
@@ -64,10 +73,10 @@ def plot_moment(
         plot_action(ax, moment, name, scale=scale, possible=possible)
         _title(ax, f"{name}: Q = {style.told(value, decimals)}", moment.components(name))
     if choice.foil is not None:
-        plot_contrast(axes[-1], moment, choice.action, choice.foil, trial=trial)
-        delta = settled(moment.difference(choice.action, choice.foil))
+        plot_contrast(axes[-1], moment, *names, trial=trial)
+        delta = settled(moment.difference(*names))
         gap = style.told(float(delta.sum()), decimals_for([delta.sum()]))
-        _title(axes[-1], f"{choice.action} − {choice.foil}: {gap}", delta)
+        _title(axes[-1], f"{' − '.join(names)}: {gap}", delta)
     for ax in axes[:-1]:
         ax.tick_params(labelbottom=False)
     axes[-1].set_xlabel(style.STEPS)
@@ -114,7 +123,7 @@ def plot_contrast(
     return ax
 
 
-def explain_marks(figure: Figure, choice: Choice, trial: Trial | None = None) -> None:
+def _explain_marks(figure: Figure, choice: Choice, trial: Trial | None = None) -> None:
     """Adds a legend of the marks that are there, and says whose future it is."""
     moment, names = choice.moment, names_of(choice)
     handles: list[Artist] = [bars.residual_handle()]
@@ -173,9 +182,9 @@ def _title(ax: Axes, text: str, components: FloatArray) -> None:
 
 def _survival(moment: Moment, action: str) -> FloatArray:
     """Returns `[N+1]`: the chance that the episode still runs, 1 where it is not known."""
-    known = moment.uncertainty
-    ones = np.ones(moment.time_axis.num_components)
-    return ones if known is None else np.asarray(known.survival[moment.index(action)])
+    if moment.uncertainty is None:
+        return np.ones(moment.time_axis.num_components)
+    return np.asarray(moment.uncertainty.survival[moment.index(action)])
 
 
 def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:

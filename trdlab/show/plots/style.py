@@ -7,7 +7,7 @@ their text can be read on a phone; they need no pyplot, and no backend of the us
 """
 
 import io
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
@@ -29,35 +29,22 @@ from trdlab.time_axis import TimeAxis
 
 Point = tuple[float, float]
 
-INK = "#16202c"
-"""What really came (rewards, routes, trials), whiskers, and text."""
-MUTED = "#5b6470"
-"""What explains the picture: axes, notes, the policy on a map, the chance to be still running."""
-EXPECTED, COST = "#1d3557", "#b3224a"
-"""Rewards and costs that are expected."""
-AGENTS = ("#4b2e83", "#b9a7dc")
-"""Two agents that are compared, the dark one first."""
+INK = "#16202c"  # what really came (rewards, routes, trials), whiskers, and text
+MUTED = "#5b6470"  # what explains: axes, notes, a policy on a map, the chance to be still running
+EXPECTED, COST = "#1d3557", "#b3224a"  # rewards and costs that are expected
+AGENTS = ("#4b2e83", "#b9a7dc")  # two that are compared, the dark one first
 EVIDENCE = {"good": "#dcecd8", "bad": "#f8d3cf", "open": "#ececec", "not tested": "#ececec"}
 """The ground that forecasts stand on: proved, disproved, and neither."""
-GROUNDS = {
-    EVIDENCE["good"]: "better than a guess",
-    EVIDENCE["bad"]: "no better than a guess",
-    EVIDENCE["open"]: "open, or not tested",
-}
-"""What a ground means."""
-
+_MEANINGS = ("better than a guess", "no better than a guess", "open, or not tested")
 _ACTIONS = (  # those of Okabe and Ito come first, and go to the directions
     *("#0072b2", "#e69f00", "#009e73", "#cc79a7"),
     *("#d55e00", "#56b4e9", "#8c6d1f", "#7f7f7f"),
 )
 _DIRECTIONS = (("up", "north"), ("down", "south"), ("left", "west"), ("right", "east"))
 
-WIDTH = 6.0
-"""Inches: where it is shown 360 pixels wide, `TEXT` is 8 pixels high."""
-TEXT, TITLE = 10.0, 11.0
-"""Points; nothing is smaller."""
-LETTERS = 72
-"""How many letters of `TEXT` fit beside each other."""
+WIDTH = 6.0  # inches: where it is shown 360 pixels wide, `TEXT` is 8 pixels high
+TEXT, TITLE = 10.0, 11.0  # points; nothing is smaller
+LETTERS = 72  # of `TEXT` that fit beside each other
 STEPS = "steps from now (t: the action taken now)"
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 
@@ -126,7 +113,7 @@ def check_picture(path: Path, *, overwrite: bool = False) -> None:
     check_output(path, PICTURE_SUFFIXES, overwrite=overwrite)
 
 
-def check_pictures(paths: Collection[Path]) -> None:
+def check_pictures(paths: Iterable[Path]) -> None:
     """Checks that pictures can be written, in folders that are made if there are none.
 
     Raises:
@@ -145,7 +132,7 @@ def save(figure: Figure, path: Path) -> None:
     """Writes a picture whole or not at all, in the format that the ending of its path names.
 
     Raises:
-        OutputError: it cannot be written, or its folder cannot be made.
+        OutputError: it, or its folder, cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -206,7 +193,7 @@ def label_steps(ax: Axes, axis: TimeAxis, places: FloatArray) -> None:
 
 
 def draw_grounds(ax: Axes, places: FloatArray, status: Sequence[str | None]) -> None:
-    """Colours the ground of components by the evidence for them; None has no ground."""
+    """Colours the ground of components by the evidence for them, where it is not None."""
     for place, found in zip(places, status, strict=True):
         if found is not None:
             ax.axvspan(place - 0.5, place + 0.5, color=EVIDENCE[found], linewidth=0, zorder=0)
@@ -215,24 +202,23 @@ def draw_grounds(ax: Axes, places: FloatArray, status: Sequence[str | None]) -> 
 def ground_handles(status: Iterable[str | None]) -> list[Patch]:
     """Returns what a legend explains of grounds: only those that there are."""
     there = {EVIDENCE[found] for found in status if found is not None}
-    return [Patch(color=c, label=meaning) for c, meaning in GROUNDS.items() if c in there]
+    meanings = zip(EVIDENCE.values(), _MEANINGS, strict=False)
+    return [Patch(color=colour, label=meaning) for colour, meaning in meanings if colour in there]
 
 
 def add_legend(figure: Figure, handles: Sequence[Artist], *lines: str) -> None:
     """Explains marks at the foot of a picture, below lines of text, which are wrapped."""
     widest = max([1, *(len(str(handle.get_label())) + 6 for handle in handles)])
     edge: Literal["left", "center"] = "left" if len(lines) > 2 else "center"
+    look: Any = {"frameon": False, "borderaxespad": 0.2, "labelspacing": 0.35, "columnspacing": 1.2}
     legend = figure.legend(
         handles=list(handles),
         loc="outside lower center",
         ncols=max(1, min(len(handles), LETTERS // widest)),
-        frameon=False,
         fontsize=TEXT,
         title="\n".join(fill(line, LETTERS) for line in lines if line),
         title_fontsize=TEXT,
         alignment=edge,
-        borderaxespad=0.2,
-        labelspacing=0.35,
-        columnspacing=1.2,
+        **look,
     )
     legend.get_title().set(color=MUTED, linespacing=1.3, multialignment=edge)

@@ -49,7 +49,7 @@ def test_what_is_there_is_never_replaced(tmp_path):
         RunFolder.create(path, CONFIG)
     assert str(caught.value) == (
         f"'{path}' holds a run already. Go on with it: trdlab resume {path}, or choose another "
-        "--out."
+        "`out`."
     )
     assert RunFolder.open(path).config == {}
     with pytest.raises(OutputError, match=r"' is not empty\. Choose another `out`\."):

@@ -33,7 +33,10 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         first, last = components
         steps = axis.steps(last)
         until = steps[-1] + 1 if axis.start(first) == 0 and steps not in (None, range(1)) else 0
-        return span_of(axis, first, last) + _played(until or axis.start(first), seconds)
+        told = span_of(axis, first, last)
+        if seconds is not None and steps is not None and 0 < axis.start(first) < steps[-1]:
+            return f"{told} ({axis.start(first) * seconds:.2g} to {steps[-1] * seconds:.2g} s)"
+        return told + _played(until or axis.start(first), seconds)
 
     def when(component: int) -> str:
         return when_of(axis, component) + _played(axis.start(component), seconds)

@@ -32,9 +32,7 @@ Found = Iterator[tuple[str, Fields]]
 
 @REPORTS.kinds(
     {
-        "scored-once": (
-            "The agent scored {returns:number} in its one episode, which is the same every time."
-        ),
+        "scored-once": ("The agent scored {returns:number}: its episodes are all the same."),
         "scored-always": "The agent scored {returns:number} in each of {episodes:episodes}.",
         "scored-few": (
             "Over {episodes:episodes} the agent scored {returns:number} each, on average."
@@ -67,34 +65,34 @@ def some_ended(report: CalibrationReport) -> Iterator[Fields]:
 
 # ---- how far to trust it -------------------------------------------------------------------------
 
-_FEW = "{episodes:count} different episodes are too few to judge {whose:text} about {span:comes}"
+_FEW = "About {span:comes}, {episodes:count} different episodes are too few to judge {whose:text}"
 
 
 @REPORTS.kinds(
     {
-        "better": "{whose:text} are better than a guess about {span:comes}.",
-        "right": "{whose:text} are right about {span:comes}: it was the same every time.",
-        "no-better": "{whose:text} are no better than a guess about {span:comes}.",
+        "better": "About {span:comes}, {whose:text} are better than a guess.",
+        "right": "About {span:comes}, {whose:text} are right: that was the same every time.",
+        "no-better": "About {span:comes}, {whose:text} are no better than a guess.",
         "wrong": (
-            "{whose:text} are wrong about {span:comes}: {said:number} on average, where "
+            "About {span:comes}, {whose:text} are wrong: {said:number} on average, but "
             "{came:number} came every time."
         ),
         "too-few": (
-            "Judging {whose:text} about {span:comes} needs {enough:count} different episodes "
+            "About {span:comes}, judging {whose:text} needs {enough:count} different episodes "
             "instead of {episodes:count}."
         ),
         "unsure": f"{_FEW}; about {{enough:count}} would do.",
         "undecided": f"{_FEW}.",
-        "silent": "{whose:text} about {span:comes} were not tested: no reward came then.",
-        "unseen": "{whose:text} about {span:comes} were not tested: {unseen:text}.",
+        "silent": "About {span:comes}, {whose:text} were not tested: no reward came then.",
+        "unseen": "About {span:comes}, {whose:text} were not tested: {unseen:text}.",
     }
 )
 def judged(report: CalibrationReport) -> Found:
     cut = "episodes were cut off before" if report.judged.truncated else "no episode shows it"
-    unseen = "random actions came in between" if report.judged.epsilon > 0.0 else cut
+    unseen = "there were random actions before" if report.judged.epsilon > 0.0 else cut
     yield from _verdicts(OWN, report.calibration, unseen)
     if report.foils is not None:
-        yield from _verdicts(OTHERS, report.foils, "no copy was followed so far")
+        yield from _verdicts(OTHERS, report.foils, "no copy was played that long")
 
 
 def _verdicts(whose: str, told: Calibration, unseen: str) -> Found:
@@ -156,9 +154,9 @@ def _in_short(claims: list[Claim]) -> list[Claim]:
 
 @REPORTS.kinds(
     {
-        "no-chance": "Copies of a state never went differently, so all that comes can be known.",
+        "no-chance": "Copies of a state always went the same way, so all that comes can be known.",
         "shared-chance": (
-            "Copies of a state never went differently, yet states that look alike did: the copies "
+            "Copies of a state always went the same way, but states that look alike did not: copies "
             "may share their chance."
         ),
         "cannot-be-known": (
@@ -205,11 +203,11 @@ def _known(report: CalibrationReport) -> list[Claim]:
 @REPORTS.kinds(
     {
         "expects-later": (
-            "{share:percent} of what the agent expects comes {component:when}; it does not say "
-            "when."
+            "Of all that the agent expects, {share:percent} comes {component:when}, in one sum "
+            "without a date."
         ),
         "differs-later": (
-            "{share:percent} of what sets its best action apart from the next best comes "
+            "Of the difference between its best and its next best action, {share:percent} comes "
             "{component:when}."
         ),
     }
@@ -223,7 +221,7 @@ def later(report: CalibrationReport) -> Found:
 
 
 @REPORTS.rule(
-    "With N = {horizon:count}, at most {share:percent} of the rewards that came would be later."
+    "With N = {horizon:count}, at most {share:percent} of the rewards that came would have no date."
 )
 def would_suffice(report: CalibrationReport) -> Iterator[Fields]:
     least = report.residual.sufficient

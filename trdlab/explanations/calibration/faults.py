@@ -110,8 +110,8 @@ def beyond(report: CalibrationReport) -> Iterator[tuple[str, Fields]]:
 
 
 @REPORTS.rule(
-    "The agent discounts what comes {width:steps} later by {measured:number}, and not by "
-    "{right:number}."
+    "For the agent a reward {width:steps} later counts {measured:number} times as much; right "
+    "would be {right:number}."
 )
 def discount_off(report: CalibrationReport) -> Iterator[Fields]:
     axis = report.time_axis

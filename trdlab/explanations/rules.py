@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -21,6 +21,9 @@ E = TypeVar("E")
 """The evidence that sentences speak of."""
 
 Fields = dict[str, Any]
+Found = tuple[str, Fields]
+"""The kind of a claim, and its fields."""
+
 _SLOT = re.compile(r"\{(\w+)(?::(\w+))?\}")
 
 
@@ -134,6 +137,25 @@ class Language(Generic[E]):
 
         return made
 
+    def kinds(
+        self, *, holds: Callable[..., bool] | None = None, **says: str
+    ) -> Callable[[Callable[[E], Iterable[Found]]], tuple[Rule[E], ...]]:
+        """Makes several rules, in their order, of one function that yields kinds and fields.
+
+        Args:
+            holds: as of `rule`.
+            says: of each kind its sentence.
+        """
+
+        def made(find: Callable[[E], Iterable[Found]]) -> tuple[Rule[E], ...]:
+            kinds = {name.replace("_", "-"): sentence for name, sentence in says.items()}
+            return tuple(
+                self.rule(sentence, kind=kind, holds=holds)(partial(_of_kind, kind, find))
+                for kind, sentence in kinds.items()
+            )
+
+        return made
+
     def say(self, claim: Claim) -> str:
         """Returns a claim as a sentence, its numbers with as many digits as tell them apart."""
         forms, fields, says = self.forms(claim.evidence), claim.fields, claim.rule.says
@@ -157,6 +179,10 @@ class Language(Generic[E]):
     def knows(self, sentence: str) -> bool:
         """Returns whether a sentence looks like one of these rules'."""
         return any(_skeleton(rule.says).fullmatch(sentence) for rule in self.rules.values())
+
+
+def _of_kind(kind: str, find: Callable[[E], Iterable[Found]], evidence: E) -> Iterable[Fields]:
+    return (fields for own, fields in find(evidence) if own == kind)
 
 
 def check(text: str, known: Sequence[tuple[Language[Any], Any]]) -> list[Claim]:

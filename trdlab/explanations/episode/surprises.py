@@ -1,12 +1,12 @@
 """Steps of an episode that turned out other than expected, and why."""
 
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.explanations.episode.played import EPISODES, Played
-from trdlab.explanations.rules import Claim, Fields
+from trdlab.explanations.rules import Claim, Fields, Found
 
 FOCUS = 1 / 3
 """The share of a surprise that one component must account for, to be named as its reason."""
@@ -15,37 +15,6 @@ NEARLY = 1 / 4
 
 _TURNED = "{action} at {step:step} turned out {gap:number} {outcome:text} than expected"
 _ALIKE = "all together it expects about the same."
-_SAYS = {
-    "turned-out": f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
-    "ended-early": (  # the future ended, which changed more than the reward did
-        f"{_TURNED}, mainly because {{ending:text}} while {{promised:rewards}} were still expected."
-    ),
-    "other-reward": (
-        f"{_TURNED}, mainly because {{reward:paid}} came where {{expected:number}} was expected."
-    ),
-    "no-reward": f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
-    "other-belief": (  # of a later component
-        "After {action} at {step:step} it expected {gap:number} {much:text} than before, mainly "
-        "because what it expects {component:when} went from {was:number} to {now:number}."
-    ),
-    "spread-out": (  # half of what speaks for the outcome lies at a step or before
-        "After {action} at {step:step} it expected {gap:number} {much:text} than before, spread "
-        "over many steps: half of it {by:within}."
-    ),
-    "put-off": (
-        "{action} at {step:step} delayed {worth:rewards}: they were to come {origin:when}, and now "
-        f"{{to:when}}; {_ALIKE}"
-    ),
-    "brought-forward": (
-        "{action} at {step:step} brought {worth:rewards} forward: they were to come {origin:when}, "
-        f"and now {{to:when}}; {_ALIKE}"
-    ),
-    "exchanged": (
-        "{action} at {step:step} gained {gain:number} {up:when} and lost {loss:number} "
-        f"{{down:when}}; {_ALIKE}"
-    ),
-}
-"""Of each kind of turn its sentence; each is one rule."""
 
 
 def surprise(played: Played, row: int) -> Claim:
@@ -59,24 +28,47 @@ def surprise(played: Played, row: int) -> Claim:
     return Claim(EPISODES.rules[kind], played, fields)
 
 
-# ---- what a step changed -----------------------------------------------------------------------
-
-
 @lru_cache(maxsize=8)
-def _turns(played: Played) -> tuple[tuple[str, Fields], ...]:
+def _turns(played: Played) -> tuple[Found, ...]:
     """Returns `[T′]`, of each step of the revision what kind of turn it was, and its numbers."""
     return tuple(_turn(played, row) for row in range(len(played.revision)))
 
 
-def _of_kind(kind: str, played: Played) -> list[Fields]:
-    return [fields for name, fields in _turns(played) if name == kind]
+@EPISODES.kinds(
+    turned_out=f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
+    ended_early=(  # the future ended, which changed more than the reward did
+        f"{_TURNED}, mainly because {{ending:text}} while {{promised:rewards}} were still expected."
+    ),
+    other_reward=(
+        f"{_TURNED}, mainly because {{reward:paid}} came where {{expected:number}} was expected."
+    ),
+    no_reward=f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
+    other_belief=(  # of a later component
+        "After {action} at {step:step} it expected {gap:number} {much:text} than before, mainly "
+        "because what it expects {component:when} went from {was:number} to {now:number}."
+    ),
+    spread_out=(  # half of what speaks for the outcome lies at a step or before
+        "After {action} at {step:step} it expected {gap:number} {much:text} than before, spread "
+        "over many steps: half of it {by:within}."
+    ),
+    put_off=(
+        "{action} at {step:step} delayed {worth:rewards}: they were to come {origin:when}, and now "
+        f"{{to:when}}; {_ALIKE}"
+    ),
+    brought_forward=(
+        "{action} at {step:step} brought {worth:rewards} forward: they were to come {origin:when}, "
+        f"and now {{to:when}}; {_ALIKE}"
+    ),
+    exchanged=(
+        "{action} at {step:step} gained {gain:number} {up:when} and lost {loss:number} "
+        f"{{down:when}}; {_ALIKE}"
+    ),
+)
+def turns(played: Played) -> tuple[Found, ...]:
+    return _turns(played)
 
 
-for _kind, _says in _SAYS.items():
-    EPISODES.rule(_says, kind=_kind)(partial(_of_kind, _kind))
-
-
-def _turn(played: Played, row: int) -> tuple[str, Fields]:
+def _turn(played: Played, row: int) -> Found:
     of = played.revision
     step, before, after = int(of.steps[row]), of.before[row], of.after[row]
     about: Fields = {"step": step, "action": played.action(step)}
@@ -110,7 +102,7 @@ def _turn(played: Played, row: int) -> tuple[str, Fields]:
 
 def _shift(
     about: Fields, before: FloatArray, after: FloatArray, up: int, down: int, moved: float
-) -> tuple[str, Fields]:
+) -> Found:
     """Returns what a step did that moved rewards, or costs, and left the total about the same."""
     slack = NEARLY * moved
     if before[up] >= -slack and after[down] >= -slack:

@@ -18,14 +18,14 @@ _SOON = 4, 0.2  # immediate are so many steps, or such a share of the explicit o
 _MOST_CROSSINGS = 2  # of more only the last is told
 
 
-def better_of(choice: Choice, **also: object) -> Iterator[Fields]:
+def better_of(choice: Choice) -> Iterator[Fields]:
     """Yields which action has the larger Q-value, if one has."""
     gamma = choice.time_axis.gamma
     for better, worse in choice.orders:
         a, b = choice.moment.q_value(better), choice.moment.q_value(worse)
         if a > b and not same(a, b):
             names = {"better": better, "worse": worse, "better_value": a, "worse_value": b}
-            yield names | {"gamma": gamma, "loss": 1.0 - gamma} | also
+            yield names | {"gamma": gamma, "loss": 1.0 - gamma}
 
 
 def is_by_discount(choice: Choice) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from trdlab.explanations.rules import Claim, Fields, Form, Language, every, plain_data
+from trdlab.explanations.rules import Claim, Fields, Form, Found, Language, every, plain_data
 from trdlab.explanations.sections import Section
 from trdlab.explanations.words import forms_of
 from trdlab.rollouts.counterfactual import Counterfactual
@@ -76,34 +76,22 @@ def _forms(trial: Trial) -> dict[str, Form]:
             return " " + forms["when"].show(component, digits)
         return "" if whole else " " + forms["within"].show(axis.num_steps - 1, digits)
 
-    def paid(component: int | None, is_past: bool) -> str:
-        if component is None and whole:
-            return "was worth" if is_past else "is worth"
-        return "paid" if is_past else "pays"
+    def paid(pays: str, is_worth: str) -> Form:
+        return Form(lambda at, _: is_worth if at is None and whole else pays)
 
-    return forms | {
-        "at": Form(at),
-        "paid": Form(lambda component, _: paid(component, is_past=True)),
-        "pays": Form(lambda component, _: paid(component, is_past=False)),
-    }
+    own = {"at": Form(at), "paid": paid("paid", "was worth"), "pays": paid("pays", "is worth")}
+    return forms | own
 
 
 TRIALS = Language[Trial]("this trial", _forms)
-rule = TRIALS.rule
-
-# ---- how often -----------------------------------------------------------------------------------
 
 
-@rule("{action} and {foil} were each tried {copies:times} from here{how:text}.")
+@TRIALS.rule("{action} and {foil} were each tried {copies:times} from here{how:text}.")
 def tried(trial: Trial) -> Iterator[Fields]:
     how = ", and each brought the same every time" if trial.found.same_every_time else ""
     if not trial.is_seen:
         how = ", but cut off before anything could come"
     yield {"action": trial.action, "foil": trial.foil, "copies": trial.found.copies, "how": how}
-
-
-# ---- whether what was forecast came --------------------------------------------------------------
-# `more` is the action that was forecast to be ahead, so what was said is above 0.
 
 
 def _includes(came: Estimate, value: float) -> bool:
@@ -112,104 +100,59 @@ def _includes(came: Estimate, value: float) -> bool:
     return came.low - slack <= value <= came.high + slack
 
 
-@rule("As forecast, {more} {component:paid} {said:number} more than {less}{component:at}.")
-def came_exactly(trial: Trial) -> Iterator[Fields]:
-    """There is no chance, and it is what was forecast."""
+@TRIALS.kinds(
+    came_exactly=(
+        "As forecast, {more} {component:paid} {said:number} more than {less}{component:at}."
+    ),
+    came_as_forecast=(
+        "As forecast, {more} {component:paid} {came:estimate} more than {less}{component:at}; "
+        "{said:number} was forecast."
+    ),
+    by_another_amount=(
+        "{more} {component:paid} {came:estimate} more than {less}{component:at}, {than:text} than "
+        "the {said:number} that was forecast."
+    ),
+    less_than_forecast=(
+        "{more} {component:paid} at most {most:number} more than {less}{component:at}, less than "
+        "the {said:number} that was forecast."
+    ),
+    against_the_forecast=(
+        "Against the forecast, {less} {component:paid} {ahead:estimate} more than {more}"
+        "{component:at}; {more} was to be {said:number} ahead."
+    ),
+    no_difference=(
+        "Against the forecast, {more} {component:paid} no more than {less}{component:at}; "
+        "{said:number} more was forecast."
+    ),
+    too_few_tries=(
+        "Trying each {copies:times} was too few to tell whether {more} {component:pays} more than "
+        "{less}{component:at}; about {enough:count} would do."
+    ),
+    too_close_to_tell=(
+        "Trying cannot tell whether {more} {component:pays} more than {less}{component:at}: they "
+        "are too close."
+    ),
+)
+def outcomes(trial: Trial) -> Iterator[Found]:
+    """Whether what was forecast came; `more` is what was forecast to be ahead, by `said` > 0."""
     for gap in trial.gaps():
-        came = gap["came"]
-        if came.low == came.high > 0.0 and _includes(came, gap["said"]):
-            yield gap
-
-
-@rule(
-    "As forecast, {more} {component:paid} {came:estimate} more than {less}{component:at}; "
-    "{said:number} was forecast."
-)
-def came_as_forecast(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        is_certain = gap["came"].low == gap["came"].high
-        if gap["came"].low > 0.0 and _includes(gap["came"], gap["said"]) and not is_certain:
-            yield gap
-
-
-@rule(
-    "{more} {component:paid} {came:estimate} more than {less}{component:at}, {than:text} than the "
-    "{said:number} that was forecast."
-)
-def by_another_amount(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        if gap["came"].low > 0.0 and not _includes(gap["came"], gap["said"]):
-            yield gap | {"than": "more" if gap["came"].low > gap["said"] else "less"}
-
-
-@rule(
-    "{more} {component:paid} at most {most:number} more than {less}{component:at}, less than the "
-    "{said:number} that was forecast."
-)
-def less_than_forecast(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        came = gap["came"]
-        if came.low <= 0.0 <= came.high < gap["said"] and came.low < came.high:
-            yield gap | {"most": came.high}
-
-
-@rule(
-    "Against the forecast, {less} {component:paid} {ahead:estimate} more than {more}"
-    "{component:at}; {more} was to be {said:number} ahead."
-)
-def against_the_forecast(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        if gap["came"].high < 0.0:
-            yield gap | {"ahead": -gap["came"]}
-
-
-@rule(
-    "Against the forecast, {more} {component:paid} no more than {less}{component:at}; "
-    "{said:number} more was forecast."
-)
-def no_difference(trial: Trial) -> Iterator[Fields]:
-    for gap in trial.gaps():
-        if gap["came"].low == gap["came"].high == 0.0:
-            yield gap
-
-
-def _open(trial: Trial) -> Iterator[Fields]:
-    """Yields the differences that may have come or not, and how many tries would tell."""
-    for gap in trial.gaps():
-        came, copies = gap["came"], trial.found.copies
-        if came.low <= 0.0 and gap["said"] <= came.high and came.low < came.high:
-            needed = enough(copies, (came.high - came.low) / 2.0, gap["said"])
-            yield gap | {"copies": copies, "enough": needed and max(needed, 2 * copies)}
-
-
-@rule(
-    "Trying each {copies:times} was too few to tell whether {more} {component:pays} more than "
-    "{less}{component:at}; about {enough:count} would do."
-)
-def too_few_tries(trial: Trial) -> Iterator[Fields]:
-    yield from (gap for gap in _open(trial) if gap["enough"] is not None)
-
-
-@rule(
-    "Trying cannot tell whether {more} {component:pays} more than {less}{component:at}: they are "
-    "too close."
-)
-def too_close_to_tell(trial: Trial) -> Iterator[Fields]:
-    yield from (gap for gap in _open(trial) if gap["enough"] is None)
-
-
-# ---- what is told --------------------------------------------------------------------------------
-
-_OUTCOMES = (
-    came_exactly,
-    came_as_forecast,
-    by_another_amount,
-    less_than_forecast,
-    against_the_forecast,
-    no_difference,
-    too_few_tries,
-    too_close_to_tell,
-)
+        came, said, copies = gap["came"], gap["said"], trial.found.copies
+        is_certain = came.low == came.high
+        if came.low > 0.0 and _includes(came, said):
+            yield "came-exactly" if is_certain else "came-as-forecast", gap
+        elif came.low > 0.0:
+            yield "by-another-amount", gap | {"than": "more" if came.low > said else "less"}
+        elif came.high < 0.0:
+            yield "against-the-forecast", gap | {"ahead": -came}
+        elif is_certain:
+            yield "no-difference", gap
+        elif came.low <= 0.0 <= came.high < said:
+            yield "less-than-forecast", gap | {"most": came.high}
+        elif came.low <= 0.0 and said <= came.high:
+            needed = enough(copies, (came.high - came.low) / 2.0, said)
+            tries = {"copies": copies, "enough": needed and max(needed, 2 * copies)}
+            kind = "too-close-to-tell" if tries["enough"] is None else "too-few-tries"
+            yield kind, gap | tries
 
 
 def sections(trial: Trial) -> tuple[Section, ...]:
@@ -219,24 +162,22 @@ def sections(trial: Trial) -> tuple[Section, ...]:
 
 def in_brief(trial: Trial) -> list[Claim]:
     """Returns what came in all, and what came against the forecast when; nothing if not seen."""
-    told = [claim for claim in _told(trial) if claim.rule in _OUTCOMES]
-    return [
-        claim for claim in told if claim.component is None or claim.rule is against_the_forecast
-    ][:2]
+    return [of for of in _came(trial) if of.component is None or of.kind == "against-the-forecast"][
+        :2
+    ]
 
 
 def _told(trial: Trial) -> tuple[Claim, ...]:
-    order, furthest = _outcomes(trial), _furthest(trial)
-    told = [claim for claim in order if claim.component is None or claim.component in furthest]
-    return (*told, *tried(trial))
+    return (*_came(trial), *tried(trial))
 
 
-def _outcomes(trial: Trial) -> list[Claim]:
-    """Returns what came in all, and then of each component."""
+def _came(trial: Trial) -> list[Claim]:
+    """Returns what came in all, and then of the components that are worth a sentence."""
     if not trial.is_seen:
         return []
-    found = every(trial, *_OUTCOMES)
-    return sorted(found, key=lambda claim: -1 if claim.component is None else claim.component)
+    found, furthest = every(trial, *outcomes), {None, *_furthest(trial)}
+    told = [claim for claim in found if claim.component in furthest]
+    return sorted(told, key=lambda claim: -1 if claim.component is None else claim.component)
 
 
 def _furthest(trial: Trial) -> set[int]:

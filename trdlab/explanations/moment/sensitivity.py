@@ -10,7 +10,7 @@ import numpy as np
 
 from trdlab.explanations.moment.leads import better_of
 from trdlab.explanations.moment.moment import CHOICES, Choice, WhatIf
-from trdlab.explanations.rules import Claim, Fields, every
+from trdlab.explanations.rules import Claim, Fields, Found, every
 from trdlab.formatting import digits_to_tell, plain, said
 
 SAMPLES = 64
@@ -28,7 +28,7 @@ def sensitivity(choice: Choice) -> list[Claim]:
     every value. A preference that stays the same but for ties counts as never flipping; where the
     actions tie as it is, there is no preference to flip.
     """
-    return every(choice, flips, never_flips, several_flips, searched)
+    return every(choice, flips, *in_all, searched)
 
 
 def find_flips(gap: Gap, low: float, high: float, *, samples: int = SAMPLES) -> tuple[float, ...]:
@@ -157,20 +157,18 @@ def flips(choice: Choice) -> Iterator[Fields]:
                 yield {"better": better, "worse": worse} | _bounds(of, side, (side[0] + end) / 2)
 
 
-@CHOICES.rule("No value that was tried for {quantity:text} makes {worse} better than {better}.")
-def never_flips(choice: Choice) -> Iterator[Fields]:
+@CHOICES.kinds(
+    never_flips="No value that was tried for {quantity:text} makes {worse} better than {better}.",
+    several_flips="In all, the preference changes at these values of {quantity:text}: {at:roots}.",
+)
+def in_all(choice: Choice) -> Iterator[Found]:
+    """Quantities that never flip it, or more often than at the nearest values."""
     for of, better, worse, roots in _found(choice):
         if not roots:
-            yield {"quantity": of.name, "worse": worse, "better": better}
-
-
-@CHOICES.rule("In all, the preference changes at these values of {quantity:text}: {at:roots}.")
-def several_flips(choice: Choice) -> Iterator[Fields]:
-    """Where there are more flips of one quantity than the nearest."""
-    for of, _, _, roots in _found(choice):
-        if len(roots) > 1:
+            yield "never-flips", {"quantity": of.name, "worse": worse, "better": better}
+        elif len(roots) > 1:
             at = tuple(abs(root) for root in roots)
-            yield {"quantity": of.name, "at": at}
+            yield "several-flips", {"quantity": of.name, "at": at}
 
 
 @CHOICES.rule(

@@ -23,9 +23,7 @@ from trdlab.rollouts.playing import Playing, Watch, part_of, unwatched
 from trdlab.statistics import FEWEST_EPISODES
 from trdlab.tabular import ExactTable
 
-FOLLOWED = 100
-"""Steps for which two actions that are tried are followed at least."""
-
+FOLLOWED = 100  # steps for which two actions that are tried are followed at least
 LOST = (
     "So nothing tells how well anybody could forecast here, nor how well the agent forecasts "
     "actions that it would not take."

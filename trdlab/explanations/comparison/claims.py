@@ -17,11 +17,8 @@ FURTHEST = 3  # of the largest disagreements are told
 
 def in_brief(comparison: Comparison) -> list[Claim]:
     """Returns who expects more, when, whether they would do the same, and whom to trust."""
-    told = (
-        first(comparison, nothing_differs, *how_much)
-        + _when(comparison)[:1]
-        + every(comparison, agreement)
-    )
+    told = [*first(comparison, nothing_differs, *how_much), *_when(comparison)[:1]]
+    told += every(comparison, agreement)
     trust = [every(comparison, trusted)[i:][1:2] for i in _begins(comparison)]
     return list(at_first([*told, *(claim for claims in trust for claim in claims)]))
 
@@ -47,8 +44,8 @@ def sections(comparison: Comparison) -> tuple[Section, ...]:
 
 
 def _when(comparison: Comparison) -> list[Claim]:
-    by_then = first(comparison, *later, come_by)
-    return every(comparison, largest_at, most_of_it) + by_then
+    when = every(comparison, largest_at, most_of_it)
+    return when + first(comparison, *later, come_by)
 
 
 @COMPARISONS.rule("They expect the same of every action, at every state they were compared at.")
@@ -148,16 +145,14 @@ def later(comparison: Comparison) -> Iterator[Found]:
         lead = shares[1 - late] - shares[late]
         is_sure = shift.value != 0.0 and not shift.low <= 0.0 <= shift.high
         if is_sure and (shift.value > 0.0) == bool(late) and (lead >= -1e-9).all():
-            yield (
-                "later-rewards" if sign > 0.0 else "later-costs",
-                {
-                    "later": SIDES[late],
-                    "sooner": SIDES[1 - late],
-                    "last_step": (c + 1) * comparison.time_axis.width - 1,
-                    "later_share": float(shares[late, c]),
-                    "sooner_share": float(shares[1 - late, c]),
-                },
-            )
+            fields = {
+                "later": SIDES[late],
+                "sooner": SIDES[1 - late],
+                "last_step": (c + 1) * comparison.time_axis.width - 1,
+                "later_share": float(shares[late, c]),
+                "sooner_share": float(shares[1 - late, c]),
+            }
+            yield "later-rewards" if sign > 0.0 else "later-costs", fields
 
 
 @COMPARISONS.rule(

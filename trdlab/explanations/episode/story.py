@@ -11,7 +11,6 @@ from trdlab.explanations.episode.promises import broken_promises, foreseen
 from trdlab.explanations.episode.surprises import sizes, surprise
 from trdlab.explanations.rules import Claim, Found, every
 from trdlab.explanations.sections import Section
-from trdlab.rollouts.episodes import Episode
 
 MOMENTS = 5  # of an episode are told
 
@@ -51,12 +50,7 @@ class Story:
 
 
 def tell(played: Played, *, moments: int = MOMENTS) -> Story:
-    """Returns the story of an episode.
-
-    Args:
-        played: the episode.
-        moments: how many are told, at most.
-    """
+    """Returns the story of an episode, with so many moments at most."""
     broken = broken_promises(played)[:1]
     told = [*broken, *foreseen(played)[:1]][:moments]
     goes_on = not played.episode.terminated  # past what was seen, so its last step ends no promise
@@ -153,28 +147,19 @@ def ended(played: Played) -> Iterator[Found]:
 )
 def outcome(played: Played) -> Iterator[Found]:
     """The discounted reward up to the first end, and whether that was expected but for rounding."""
-    episode, until = played.episode, first_end(played.episode)
-    if until is not None:
+    episode = played.episode
+    if episode.ends.any():  # else a truncation came first, and more could have come
+        until = int(episode.ends.argmax())
         discounts = float(episode.time_axis.gamma) ** np.arange(until + 1)
         got = float(discounts @ episode.rewards[: until + 1])
         expected = float(episode.expected[0].sum())
         is_close = same(got, expected) or abs(got - expected) <= ROUNDING * played.scale
         lost = f" up to step {until:,}, where a life was lost"
-        yield (
-            "as-expected" if is_close else "other-than-expected",
-            {
-                "got": got,
-                "expected": expected,
-                "until": until,
-                "scope": "" if until == len(episode) - 1 else lost,
-                "is_as_expected": is_close,
-            },
-        )
-
-
-def first_end(episode: Episode) -> int | None:
-    """Returns the first step after which nothing is left to come, None if a truncation was first.
-
-    That is where the episode terminated, or a life was lost and that counts.
-    """
-    return int(episode.ends.argmax()) if episode.ends.any() else None
+        fields = {
+            "got": got,
+            "expected": expected,
+            "until": until,
+            "scope": "" if until == len(episode) - 1 else lost,
+            "is_as_expected": is_close,
+        }
+        yield "as-expected" if is_close else "other-than-expected", fields

@@ -8,22 +8,15 @@ from trdlab.arrays import FloatArray
 from trdlab.explanations.episode.played import EPISODES, Played
 from trdlab.explanations.rules import Claim, Fields, Found
 
-FOCUS = 1 / 3
-"""The share of a surprise that one component must account for, to be named as its reason."""
-NEARLY = 1 / 4
-"""The share of what moved from one step to another by which signs may be mixed there."""
+FOCUS = 1 / 3  # of a surprise: what one component must account for, to be named as its reason
+NEARLY = 1 / 4  # of what moved from one step to another: how far signs may be mixed there
 
 _TURNED = "{action} at {step:step} turned out {gap:number} {outcome:text} than expected"
 _ALIKE = "all together it expects about the same."
 
 
 def surprise(played: Played, row: int) -> Claim:
-    """Returns what is to say of a step that changed something.
-
-    Args:
-        played: the episode.
-        row: the place of the step in its revision.
-    """
+    """Returns what is to say of the step at a row of the revision, which changed something."""
     kind, fields = _turns(played)[row]
     return Claim(EPISODES.rules[kind], played, fields)
 
@@ -119,8 +112,7 @@ def _shift(
 def focus(directed: FloatArray) -> int | None:
     """Returns the component that changed most in a direction, None if many changed as much.
 
-    Args:
-        directed: `[N+1]`, the change; what is above 0 speaks for the outcome.
+    What is above 0 of the change `[N+1]` speaks for the outcome.
     """
     peak = int(directed.argmax())
     return peak if directed[peak] >= FOCUS * np.maximum(directed, 0.0).sum() else None

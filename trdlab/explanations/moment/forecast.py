@@ -1,6 +1,6 @@
 """Forecast: what one action is expected to pay, and when."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -19,9 +19,7 @@ from trdlab.explanations.moment.steps import (
 )
 from trdlab.explanations.rules import Claim, Fields, Found, every, first
 
-_MATTERS = 0.5
-"""An error is told that is at least this share of what is expected."""
-
+_MATTERS = 0.5  # of what is expected: an error is told that is at least this share
 _TOO_LITTLE = 0.05  # of an action's value, to tell that it lies beyond
 
 
@@ -114,7 +112,9 @@ def firsts(choice: Choice) -> Iterator[Found]:
         if notable.size:
             i = int(notable[0])
             effect = "clear " * bool(part[:i].any()) + effect
-            found.append((i, effect, float(part[i]), _chances(paid, i, sign)))
+            step = paid[i] if paid else {}
+            chances = {abs(r): p for r, p in step.items() if sign * r > 0.0}
+            found.append((i, effect, float(part[i]), chances))
     for i, effect, mean, chances in sorted(found):
         chance = min(sum(chances.values()), 1.0)
         amounts, is_one = tuple(sorted(chances)), len(chances) == 1
@@ -122,20 +122,18 @@ def firsts(choice: Choice) -> Iterator[Found]:
         is_sure = one_for_sure if paid else moment.is_sure(action, slice(i, i + 1))
         several = "first-of-several" if amounts else "first-expected"
         kind = "first-reward" if is_sure else "first-chance" if is_one else several
-        yield (
-            kind,
-            {
-                "action": action,
-                "effect": effect,
-                "component": i,
-                "earliest": " at the earliest" if i else "",
-                "worth": axis.width > 1,
-                "amount": amounts[0] if kind == "first-chance" else mean,
-                "amounts": amounts,
-                "chance": chance,
-                "is_sure": is_sure,
-            },
-        )
+        fields = {
+            "action": action,
+            "effect": effect,
+            "component": i,
+            "earliest": " at the earliest" if i else "",
+            "worth": axis.width > 1,
+            "amount": amounts[0] if kind == "first-chance" else mean,
+            "amounts": amounts,
+            "chance": chance,
+            "is_sure": is_sure,
+        }
+        yield kind, fields
 
 
 @CHOICES.rule("Forecasts of what comes {component:when} are off by about {error:number}.")
@@ -184,9 +182,3 @@ def one_sign(row: FloatArray) -> bool:
 
 def _row(choice: Choice) -> FloatArray:
     return choice.moment.components(choice.action)
-
-
-def _chances(paid: Sequence[dict[float, float]], i: int, sign: float) -> dict[float, float]:
-    """Returns the amounts of one sign that a step can pay, and the chance of each."""
-    step = paid[i] if paid else {}
-    return {abs(r): p for r, p in step.items() if sign * r > 0.0}

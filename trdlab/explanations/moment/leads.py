@@ -10,9 +10,7 @@ from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.steps import NEGLIGIBLE, SHARE, least, stands_out
 from trdlab.explanations.rules import Fields
 
-NOISE = 0.1
-"""A lead of what was learned may be noise up to this share of the largest one."""
-
+NOISE = 0.1  # of the largest lead: up to this one of what was learned may be noise
 _SEEN = 1e-3  # of a sum: a cost that changes it as it is printed
 _SOON = 4, 0.2  # immediate are so many steps, or such a share of the explicit ones
 _MOST_CROSSINGS = 2  # of more only the last is told
@@ -64,7 +62,8 @@ def leads_of(choice: Choice) -> Iterator[Fields]:
     """
     axis, soon = choice.time_axis, _soon(choice)
     for leader, other in choice.orders:
-        lead = _clear(choice.moment, leader, other)  # [N]
+        lead = choice.moment.lead(leader, other)[:-1]  # [N]
+        lead[np.abs(lead) < _least_lead(choice.moment, leader, other)] = 0.0
         places = np.flatnonzero(lead)
         if not places.size or lead[places[0]] < 0:
             continue
@@ -92,7 +91,6 @@ def is_immediate(choice: Choice, lead: Fields) -> bool:
     return (
         _count(choice, lead) <= _soon(choice)
         and lead["other_sum"] >= 0.0
-        and not are_costs(choice, lead)
         and not has_costs(choice, lead)
     )
 
@@ -119,12 +117,6 @@ def _notable(choice: Choice, lead: Fields) -> FloatArray:
         notable = stands_out(moment, name)[:count]
         rows.append(np.where(notable, moment.components(name)[: len(notable)], 0.0))
     return np.concatenate(rows)
-
-
-def _clear(moment: Moment, action: str, foil: str) -> FloatArray:
-    """Returns `[N]`: the running lead, 0 where it is next to nothing."""
-    lead = moment.lead(action, foil)
-    return np.where(np.abs(lead) >= _least_lead(moment, action, foil), lead, 0.0)[:-1]
 
 
 def _least_lead(moment: Moment, action: str, foil: str) -> float:

@@ -10,10 +10,9 @@ from trdlab.explanations.rules import Claim, Fields, Form, Found, Language, ever
 from trdlab.explanations.sections import Section
 from trdlab.explanations.words import forms_of
 from trdlab.rollouts.counterfactual import Counterfactual
-from trdlab.statistics import Estimate, enough
+from trdlab.statistics import enough
 
-WORTH_SAYING = 0.1
-"""The share of Σ|difference| below which a component is not told of."""
+WORTH_SAYING = 0.1  # of Σ|difference|: what a component has to hold to be told of
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +93,6 @@ def tried(trial: Trial) -> Iterator[Fields]:
     yield {"action": trial.action, "foil": trial.foil, "copies": trial.found.copies, "how": how}
 
 
-def _includes(came: Estimate, value: float) -> bool:
-    """Returns whether an interval holds a number; where there is no chance, up to rounding."""
-    slack = 1e-9 * max(abs(came.low), abs(came.high))
-    return came.low - slack <= value <= came.high + slack
-
-
 @TRIALS.kinds(
     came_exactly=(
         "As forecast, {more} {component:paid} {said:number} more than {less}{component:at}."
@@ -138,7 +131,8 @@ def outcomes(trial: Trial) -> Iterator[Found]:
     for gap in trial.gaps():
         came, said, copies = gap["came"], gap["said"], trial.found.copies
         is_certain = came.low == came.high
-        if came.low > 0.0 and _includes(came, said):
+        slack = 1e-9 * max(abs(came.low), abs(came.high))  # where there is no chance
+        if came.low > 0.0 and came.low - slack <= said <= came.high + slack:
             yield "came-exactly" if is_certain else "came-as-forecast", gap
         elif came.low > 0.0:
             yield "by-another-amount", gap | {"than": "more" if came.low > said else "less"}

@@ -17,12 +17,8 @@ from trdlab.explanations.moment.steps import (
 )
 from trdlab.explanations.rules import Claim, Fields, every
 
-ALIKE = 0.05
-"""How far what is about the same may be from its mean, as a share of that."""
-
-UNEVEN = 0.25
-"""How far the spacings of a rhythm may be from their mean, as a share of it."""
-
+ALIKE = 0.05  # of their mean: how far from it what is about the same may be
+UNEVEN = 0.25  # of their mean: how far from it the spacings of a rhythm may be
 MOST_PEAKS = 4  # that are named one by one
 
 
@@ -72,9 +68,10 @@ def peak(choice: Choice) -> Iterator[Fields]:
 @CHOICES.rule("{last_step:within} the {effect:text} expected of {action} peaks {components:whens}.")
 def several_peaks(choice: Choice) -> Iterator[Fields]:
     """The most prominent of several peaks."""
-    found = peaks(choice.moment, choice.action)
+    found, sizes = peaks(choice.moment, choice.action), shares(choice.moment, choice.action)
     if len(found) > 1:
-        yield _about(choice) | {"components": _clearest(choice.moment, choice.action, found)}
+        clearest = sorted(found, key=lambda i: -prominence(sizes, i))[:MOST_PEAKS]
+        yield _about(choice) | {"components": tuple(sorted(clearest))}
 
 
 @CHOICES.rule(
@@ -116,9 +113,6 @@ def spread(choice: Choice) -> Iterator[Fields]:
     if last > first and last < len(sizes) - 1:
         fields = {"component": i, "steps": last - first + 1, "first": first, "last": last}
         yield _about(choice) | fields
-
-
-# ---- the numbers -------------------------------------------------------------------------------
 
 
 def _about(choice: Choice) -> Fields:
@@ -167,13 +161,6 @@ def _doubt(moment: Moment, action: str) -> FloatArray:
         return np.zeros(len(row))
     error = np.nan_to_num(errors[: len(row)]) / moment.time_axis.discounts[: len(row)]
     return np.asarray(error / np.abs(row).max())
-
-
-def _clearest(moment: Moment, action: str, found: list[int]) -> tuple[int, ...]:
-    """Returns the most prominent peaks, of equals the earlier, in order of time."""
-    sizes = shares(moment, action)
-    order = sorted(found, key=lambda i: -prominence(sizes, i))
-    return tuple(sorted(order[:MOST_PEAKS]))
 
 
 def _flanks(sizes: FloatArray, at: int) -> tuple[int, int]:

@@ -193,15 +193,16 @@ def _change(found: tuple[WhatIf, str, str, tuple[float, ...]]) -> tuple[bool, fl
 
 def _bounds(of: WhatIf, side: list[float], inside: float) -> Fields:
     """Returns how a sentence says for which values of a quantity the preference is another."""
-    nearest, is_more = abs(side[0]), abs(side[0]) > abs(of.current)
-    present, digits = abs(of.current), digits_to_tell([nearest, abs(of.current)])
+    nearest, present = abs(side[0]), abs(of.current)
+    digits = digits_to_tell([nearest, present])
     fields = {"quantity": of.name, "present": present, "inside": inside, "bounds": tuple(side[:2])}
+    at = said(nearest, digits)
     if len(side) > 1:
         low, high = sorted((nearest, abs(side[1])))
-        at = (f"{said(low, digits)} and {said(high, digits)}",)
-        return fields | {"were": of.verb("were between", "paid between", "cost between"), "at": at}
-    more, less = (
-        of.verb("were above", "paid more than", "cost more than"),
-        of.verb("were below", "paid less than", "cost less than"),
-    )
-    return fields | {"were": more if is_more else less, "at": (said(nearest, digits),)}
+        at = f"{said(low, digits)} and {said(high, digits)}"
+        were = of.verb("were between", "paid between", "cost between")
+    elif nearest > present:
+        were = of.verb("were above", "paid more than", "cost more than")
+    else:
+        were = of.verb("were below", "paid less than", "cost less than")
+    return fields | {"were": were, "at": (at,)}

@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cache, partial
+from functools import cache
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -148,11 +148,11 @@ class Language(Generic[E]):
         """
 
         def made(find: Callable[[E], Iterable[Found]]) -> tuple[Rule[E], ...]:
+            def of(kind: str) -> Callable[[E], Iterable[Fields]]:
+                return lambda evidence: (told for own, told in find(evidence) if own == kind)
+
             kinds = {name.replace("_", "-"): sentence for name, sentence in says.items()}
-            return tuple(
-                self.rule(sentence, kind=kind, holds=holds)(partial(_of_kind, kind, find))
-                for kind, sentence in kinds.items()
-            )
+            return tuple(self.rule(kinds[k], kind=k, holds=holds)(of(k)) for k in kinds)
 
         return made
 
@@ -179,10 +179,6 @@ class Language(Generic[E]):
     def knows(self, sentence: str) -> bool:
         """Returns whether a sentence looks like one of these rules'."""
         return any(_skeleton(rule.says).fullmatch(sentence) for rule in self.rules.values())
-
-
-def _of_kind(kind: str, find: Callable[[E], Iterable[Found]], evidence: E) -> Iterable[Fields]:
-    return (fields for own, fields in find(evidence) if own == kind)
 
 
 def check(text: str, known: Sequence[tuple[Language[Any], Any]]) -> list[Claim]:

@@ -8,8 +8,6 @@ from trdlab.formatting import percent, plain, said, significant
 from trdlab.statistics import Estimate
 from trdlab.time_axis import TimeAxis
 
-__all__ = ["counted", "forms_of", "joined"]
-
 
 @cache
 def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:

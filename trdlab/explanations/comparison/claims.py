@@ -19,14 +19,10 @@ def in_brief(comparison: Comparison) -> list[Claim]:
     """Returns who expects more, when, whether they would do the same, and whom to trust."""
     told = [*first(comparison, nothing_differs, *how_much), *_when(comparison)[:1]]
     told += every(comparison, agreement)
-    trust = [every(comparison, trusted)[i:][1:2] for i in _begins(comparison)]
-    return list(at_first([*told, *(claim for claims in trust for claim in claims)]))
-
-
-def _begins(comparison: Comparison) -> list[int]:
-    """Returns where what is said of the reports of A, and of B, begins."""
-    sides = [claim.side for claim in every(comparison, trusted)]
-    return [sides.index(side) for side in SIDES if side in sides]
+    said = every(comparison, trusted)
+    sides = [claim.side for claim in said]
+    begins = [sides.index(side) for side in SIDES if side in sides]
+    return list(at_first([*told, *(claim for i in begins for claim in said[i + 1 : i + 2])]))
 
 
 def sections(comparison: Comparison) -> tuple[Section, ...]:

@@ -10,8 +10,6 @@ from trdlab.explanations.comparison.comparison import SIDES, Comparison, compare
 from trdlab.explanations.comparison.states import visit
 from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
 
-_EPISODES, _EPISODES_OF_TABLES = 20, 50
-
 
 def compare(
     first: Agent,
@@ -43,8 +41,7 @@ def compare(
         InputError: the two do not see or do the same, discount otherwise, or there is no episode.
     """
     tables = first.world is not None and second.world is not None
-    usual = _EPISODES_OF_TABLES if tables else _EPISODES
-    count = usual if episodes is None else episodes
+    count = (50 if tables else 20) if episodes is None else episodes
     if count < 1:
         raise InputError(f"There are {count} episodes.", "Ask for at least 1.")
     first.estimator.time_axis.shared(second.estimator.time_axis)  # refuses other discounts

@@ -85,12 +85,9 @@ COMPARISONS = Language[Comparison](
 
 
 def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
-    """Returns the comparison of what two estimators expect at some states.
+    """Returns how far apart two estimators are at some states; `told` are its other fields.
 
-    Args:
-        visits: that.
-        seed: of the bootstrap.
-        told: the other fields of the comparison.
+    The seed is that of the bootstrap.
     """
     size, actions = visits.time_axis.num_components, visits.actions
     rows = np.concatenate(

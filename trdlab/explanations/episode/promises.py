@@ -162,9 +162,8 @@ def promised(episode: Episode) -> IntArray:
     if not explicit.size:
         return np.full(len(episode), -1)
     discounts = np.maximum(episode.time_axis.discounts[:-1], SMALLEST_DISCOUNT)
-    least = (
-        HALF * max(float((explicit / discounts).max()), float(episode.rewards.max())) * discounts
-    )
+    most = max(float((explicit / discounts).max()), float(episode.rewards.max()))
+    least = HALF * most * discounts
     best = explicit.argmax(axis=1)
     largest = explicit[np.arange(len(episode)), best]
     return np.where((largest > 0.0) & (largest >= least[best]), best, -1)

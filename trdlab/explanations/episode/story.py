@@ -80,12 +80,7 @@ def key_rows(played: Played, count: int, *told: range) -> list[int]:
     """Returns the rows of the revision that surprise most, spread over the episode; most first.
 
     Of two that are closer than T/(2·count) steps, or than w, the less surprising one is left out,
-    and so is all that is no larger than `SHARE` of `Played.scale`.
-
-    Args:
-        played: the episode.
-        count: how many there are, at most.
-        told: steps of which something else is told already.
+    and so is all that is no larger than `SHARE` of `Played.scale`, or at steps that are `told` of.
     """
     found, steps = sizes(played), played.revision.steps
     apart = max(played.episode.time_axis.width, len(played.episode) / (2 * max(count, 1)))

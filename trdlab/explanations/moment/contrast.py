@@ -12,7 +12,6 @@ from trdlab.explanations.moment.leads import (
     crossings,
     is_by_discount,
     is_immediate,
-    is_tied,
     leads_of,
     sums,
 )
@@ -69,7 +68,8 @@ _BY_DISCOUNT = ("different-totals", "better-by-discount", "better-against-total"
 )
 def totals(choice: Choice) -> Iterator[Found]:
     """What is paid in total."""
-    notes = {"averages": are_sure(choice), "ties": is_tied(choice)}
+    is_tied = bool(choice.moment.tied or choice.moment.tied_later)  # totals depend on it
+    notes = {"averages": are_sure(choice), "ties": is_tied}
     for action, other in choice.orders:
         a, b = choice.moment.total(action), choice.moment.total(other)
         if same(a, b):

@@ -13,7 +13,6 @@ from trdlab.explanations.moment.steps import (
     explicit_end,
     largest,
     least,
-    speaks_of_all,
     stands_out,
     undiscounted,
 )
@@ -49,7 +48,7 @@ def forecast(choice: Choice) -> list[Claim]:
 
 @CHOICES.kinds(
     earns_nothing="Nothing is expected of {action}, at any step.",
-    zero_on_average=("{action} pays nothing on average at any step, but single episodes differ."),
+    zero_on_average="{action} pays nothing on average at any step, but single episodes differ.",
     all_beyond=(
         "{action} pays nothing {last_step:within}; what comes later is worth {value:number}."
     ),
@@ -58,7 +57,7 @@ def forecast(choice: Choice) -> list[Claim]:
 def silence(choice: Choice) -> Iterator[Found]:
     moment, action, axis, row = choice.moment, choice.action, choice.time_axis, _row(choice)
     is_chancy = moment.uncertainty is not None and not moment.is_sure(action)
-    if speaks_of_all(moment, action) and not row[:-1].any():
+    if not doubtful(moment, action).any() and not row[:-1].any():
         if row[-1] == 0.0:
             yield "zero-on-average" if is_chancy else "earns-nothing", {"action": action}
         elif axis.horizon > 0:
@@ -140,19 +139,20 @@ def firsts(choice: Choice) -> Iterator[Found]:
 def off_by(choice: Choice) -> Iterator[Fields]:
     """The root mean square of what forecasts of the largest component are off by, if it matters."""
     errors, row = choice.moment.error_of(choice.action), _row(choice)
-    if errors is None or choice.moment.is_exact:
+    nothing = not undiscounted(choice.moment, choice.action).any()
+    if nothing or errors is None or choice.moment.is_exact:
         return
-    if undiscounted(choice.moment, choice.action).any():
-        i = largest(choice.moment, choice.action)
-        if errors[i] >= _MATTERS * abs(row[i]):  # not so if it is NaN
-            yield {"action": choice.action, "component": i, "error": float(errors[i])}
+    i = largest(choice.moment, choice.action)
+    if errors[i] >= _MATTERS * abs(row[i]):  # not so if it is NaN
+        yield {"action": choice.action, "component": i, "error": float(errors[i])}
 
 
 @CHOICES.rule("{share:percent} of what {action} is worth comes {component:when}.")
 def share_beyond(choice: Choice) -> Iterator[Fields]:
     """The share of the residual; all components have one sign."""
     row, horizon = _row(choice), choice.time_axis.horizon
-    if horizon > 0 and one_sign(row) and speaks_of_all(choice.moment, choice.action):
+    is_doubtful = doubtful(choice.moment, choice.action).any()
+    if horizon > 0 and one_sign(row) and not is_doubtful:
         share = float(row[-1] / row.sum())
         if _TOO_LITTLE <= share < 1.0:
             yield {"share": share, "action": choice.action, "component": horizon}

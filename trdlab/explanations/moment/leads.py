@@ -38,11 +38,6 @@ def are_sure(choice: Choice, components: slice = slice(None)) -> bool:
     return all(choice.moment.is_sure(name, components) for name in names)
 
 
-def is_tied(choice: Choice) -> bool:
-    """Returns whether totals and times depend on which of tied actions is taken."""
-    return bool(choice.moment.tied or choice.moment.tied_later)
-
-
 def sums(choice: Choice, leader: str, other: str, count: int) -> Fields:
     """Returns what two actions pay up to a component, as the fields of a claim."""
     rows = choice.moment.components(leader), choice.moment.components(other)
@@ -97,8 +92,7 @@ def is_immediate(choice: Choice, lead: Fields) -> bool:
 
 def are_costs(choice: Choice, lead: Fields) -> bool:
     """Returns whether nothing but costs stands out up to a lead."""
-    notable = _notable(choice, lead)
-    return bool(lead["leader_sum"] <= 0.0 and not (notable > 0.0).any())
+    return bool(lead["leader_sum"] <= 0.0 and not (_notable(choice, lead) > 0.0).any())
 
 
 def has_costs(choice: Choice, lead: Fields) -> bool:

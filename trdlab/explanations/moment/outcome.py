@@ -156,9 +156,8 @@ def sections(trial: Trial) -> tuple[Section, ...]:
 
 def in_brief(trial: Trial) -> list[Claim]:
     """Returns what came in all, and what came against the forecast when; nothing if not seen."""
-    return [of for of in _came(trial) if of.component is None or of.kind == "against-the-forecast"][
-        :2
-    ]
+    against = "against-the-forecast"
+    return [claim for claim in _came(trial) if claim.component is None or claim.kind == against][:2]
 
 
 def _told(trial: Trial) -> tuple[Claim, ...]:

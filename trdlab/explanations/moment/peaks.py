@@ -25,9 +25,7 @@ MOST_PEAKS = 4  # that are named one by one
 def regular(choice: Choice, named: Collection[int] = ()) -> list[Claim]:
     """Returns a rhythm, or the largest component and the peaks, and how wide the highest peak is.
 
-    Args:
-        choice: whose action it is about.
-        named: components that have been told of; if one is about the largest, that is not said.
+    Where one of the components that have been `named` is about the largest, that is not said.
     """
     sizes = np.abs(shares(choice.moment, choice.action))
     is_told = any(i < len(sizes) and sizes[i] >= 1.0 - ALIKE for i in named)

@@ -22,11 +22,6 @@ def doubtful(moment: Moment, action: str) -> BoolArray:
     return trust.doubtful
 
 
-def speaks_of_all(moment: Moment, action: str) -> bool:
-    """Returns whether all components of an action can be told of."""
-    return not doubtful(moment, action).any()
-
-
 def explicit_end(moment: Moment, action: str) -> int:
     """Returns the first component that a forecast is silent of: the residual, or one before it.
 

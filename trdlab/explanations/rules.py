@@ -17,13 +17,9 @@ import numpy as np
 from trdlab.errors import TrdlabError
 from trdlab.formatting import digits_to_tell
 
-E = TypeVar("E")
-"""The evidence that sentences speak of."""
-
+E = TypeVar("E")  # the evidence that sentences speak of
 Fields = dict[str, Any]
-Found = tuple[str, Fields]
-"""The kind of a claim, and its fields."""
-
+Found = tuple[str, Fields]  # the kind of a claim, and its fields
 _SLOT = re.compile(r"\{(\w+)(?::(\w+))?\}")
 
 
@@ -138,21 +134,20 @@ class Language(Generic[E]):
         return made
 
     def kinds(
-        self, *, holds: Callable[..., bool] | None = None, **says: str
+        self, says: Mapping[str, str], *, holds: Callable[..., bool] | None = None
     ) -> Callable[[Callable[[E], Iterable[Found]]], tuple[Rule[E], ...]]:
-        """Makes several rules, in their order, of one function that yields kinds and fields.
+        """Makes rules of a function that finds claims of several kinds: each kind and its numbers.
 
         Args:
-            holds: as of `rule`.
             says: of each kind its sentence.
+            holds: as of `rule`.
         """
 
         def made(find: Callable[[E], Iterable[Found]]) -> tuple[Rule[E], ...]:
-            def of(kind: str) -> Callable[[E], Iterable[Fields]]:
-                return lambda evidence: (told for own, told in find(evidence) if own == kind)
+            def of(kind: str) -> Callable[[E], list[Fields]]:
+                return lambda evidence: [found for own, found in find(evidence) if own == kind]
 
-            kinds = {name.replace("_", "-"): sentence for name, sentence in says.items()}
-            return tuple(self.rule(kinds[k], kind=k, holds=holds)(of(k)) for k in kinds)
+            return tuple(self.rule(says[kind], kind=kind, holds=holds)(of(kind)) for kind in says)
 
         return made
 

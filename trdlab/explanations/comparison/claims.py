@@ -51,17 +51,20 @@ def nothing_differs(comparison: Comparison) -> Iterator[Fields]:
 
 
 @COMPARISONS.kinds(
-    same_in_all=(
-        "Both expect {value:number} on average, though not the same of every action at every state."
-    ),
-    expects_more=(
-        "{more:text} expects more than {less:text}: {more_value:number} against "
-        "{less_value:number} on average."
-    ),
-    neither_surely_more=(
-        "A expects {first_value:number} on average and B {second_value:number}; with other "
-        "episodes it could be the other way round."
-    ),
+    {
+        "same-in-all": (
+            "Both expect {value:number} on average, though not the same of every action at every "
+            "state."
+        ),
+        "expects-more": (
+            "{more:text} expects more than {less:text}: {more_value:number} against "
+            "{less_value:number} on average."
+        ),
+        "neither-surely-more": (
+            "A expects {first_value:number} on average and B {second_value:number}; with other "
+            "episodes it could be the other way round."
+        ),
+    }
 )
 def how_much(comparison: Comparison) -> Iterator[Found]:
     """Who expects more in all, if other episodes would hardly turn that round."""
@@ -132,7 +135,7 @@ _LATER = (
 )
 
 
-@COMPARISONS.kinds(later_rewards=_LATER % "rewards", later_costs=_LATER % "costs")
+@COMPARISONS.kinds({"later-rewards": _LATER % "rewards", "later-costs": _LATER % "costs"})
 def later(comparison: Comparison) -> Iterator[Found]:
     """At no step has a larger share of the later one's come; all that is expected has one sign."""
     shift = comparison.shift

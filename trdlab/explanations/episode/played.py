@@ -73,7 +73,6 @@ def _rounded_up(value: float) -> float:
 
 
 EPISODES = Language[Played]("this episode", _forms)
-"""What there is to say of an episode."""
 
 
 def play(agent: Agent, seed: int = 0, *, max_steps: int | None = None) -> Played:

@@ -38,11 +38,14 @@ def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: obje
 
 
 @EPISODES.kinds(
+    {
+        "foreseen-fully": (
+            "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as it could "
+            "be."
+        ),
+        "foreseen-before": "{reward:paid} at {step:step} was foreseen {steps:steps} before.",
+    },
     holds=_is_foreseen,
-    foreseen_fully=(
-        "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as it could be."
-    ),
-    foreseen_before="{reward:paid} at {step:step} was foreseen {steps:steps} before.",
 )
 def told_ahead(played: Played) -> Iterator[Found]:
     """It was foreseen as early as there was a component for it, or not although it could have."""
@@ -121,10 +124,12 @@ _STAYED = "From {first:step} to {last:step} a reward was always {away:text} away
 
 
 @EPISODES.kinds(
+    {
+        "broken-promise": f"{_STAYED}, and never came.",
+        "overdue-promise": f"{_STAYED}, and had not come when the episode was cut off.",
+        "late-promise": f"{_STAYED}, and came only at {{came:step}}.",
+    },
     holds=_is_overdue,
-    broken_promise=f"{_STAYED}, and never came.",
-    overdue_promise=f"{_STAYED}, and had not come when the episode was cut off.",
-    late_promise=f"{_STAYED}, and came only at {{came:step}}.",
 )
 def overdue(played: Played) -> Iterator[Found]:
     """The stretches of steps at which a promised reward was overdue, and whether it came."""

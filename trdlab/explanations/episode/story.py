@@ -95,11 +95,13 @@ def key_rows(played: Played, count: int, *told: range) -> list[int]:
 
 
 @EPISODES.kinds(
-    expected_nothing="At the start the agent expected no rewards.",
-    expected_in_all="At the start the agent expected {value:rewards}.",
-    expected_at_start=(
-        "At the start the agent expected {value:rewards}, the largest part {component:when}."
-    ),
+    {
+        "expected-nothing": "At the start the agent expected no rewards.",
+        "expected-in-all": "At the start the agent expected {value:rewards}.",
+        "expected-at-start": (
+            "At the start the agent expected {value:rewards}, the largest part {component:when}."
+        ),
+    }
 )
 def expected(played: Played) -> Iterator[Found]:
     row = played.episode.expected[0]  # [N+1]
@@ -113,8 +115,10 @@ def expected(played: Played) -> Iterator[Found]:
 
 
 @EPISODES.kinds(
-    nothing_changed="No step changed what it expected.",
-    little_changed="No step changed what it expected by more than {most:bound}.",
+    {
+        "nothing-changed": "No step changed what it expected.",
+        "little-changed": "No step changed what it expected by more than {most:bound}.",
+    }
 )
 def changed(played: Played) -> Iterator[Found]:
     found = sizes(played)
@@ -125,8 +129,10 @@ def changed(played: Played) -> Iterator[Found]:
 
 
 @EPISODES.kinds(
-    ended="The episode ended after {steps:steps}{seconds:text}.",
-    cut_off="The episode was cut off after {steps:steps}{seconds:text}.",
+    {
+        "ended": "The episode ended after {steps:steps}{seconds:text}.",
+        "cut-off": "The episode was cut off after {steps:steps}{seconds:text}.",
+    }
 )
 def ended(played: Played) -> Iterator[Found]:
     seconds, steps = played.seconds_per_step, len(played.episode)
@@ -135,10 +141,13 @@ def ended(played: Played) -> Iterator[Found]:
 
 
 @EPISODES.kinds(
-    as_expected="Seen from the start it got {got:rewards}{scope:text}, as it had expected.",
-    other_than_expected=(
-        "Seen from the start it got {got:rewards}{scope:text}; it had expected {expected:number}."
-    ),
+    {
+        "as-expected": "Seen from the start it got {got:rewards}{scope:text}, as it had expected.",
+        "other-than-expected": (
+            "Seen from the start it got {got:rewards}{scope:text}; it had expected "
+            "{expected:number}."
+        ),
+    }
 )
 def outcome(played: Played) -> Iterator[Found]:
     """The discounted reward up to the first end, and whether that was expected but for rounding."""

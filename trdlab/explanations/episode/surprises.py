@@ -13,6 +13,36 @@ NEARLY = 1 / 4  # of what moved from one step to another: how far signs may be m
 
 _TURNED = "{action} at {step:step} turned out {gap:number} {outcome:text} than expected"
 _ALIKE = "all together it expects about the same."
+_SAYS = {
+    "turned-out": f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
+    "ended-early": (  # the future ended, which changed more than the reward did
+        f"{_TURNED}, mainly because {{ending:text}} while {{promised:rewards}} were still expected."
+    ),
+    "other-reward": (
+        f"{_TURNED}, mainly because {{reward:paid}} came where {{expected:number}} was expected."
+    ),
+    "no-reward": f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
+    "other-belief": (  # of a later component
+        "After {action} at {step:step} it expected {gap:number} {much:text} than before, mainly "
+        "because what it expects {component:when} went from {was:number} to {now:number}."
+    ),
+    "spread-out": (  # half of what speaks for the outcome lies at a step or before
+        "After {action} at {step:step} it expected {gap:number} {much:text} than before, spread "
+        "over many steps: half of it {by:within}."
+    ),
+    "put-off": (
+        "{action} at {step:step} delayed {worth:rewards}: they were to come {origin:when}, and now "
+        f"{{to:when}}; {_ALIKE}"
+    ),
+    "brought-forward": (
+        "{action} at {step:step} brought {worth:rewards} forward: they were to come {origin:when}, "
+        f"and now {{to:when}}; {_ALIKE}"
+    ),
+    "exchanged": (
+        "{action} at {step:step} gained {gain:number} {up:when} and lost {loss:number} "
+        f"{{down:when}}; {_ALIKE}"
+    ),
+}
 
 
 def surprise(played: Played, row: int) -> Claim:
@@ -27,38 +57,7 @@ def _turns(played: Played) -> tuple[Found, ...]:
     return tuple(_turn(played, row) for row in range(len(played.revision)))
 
 
-@EPISODES.kinds(
-    turned_out=f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
-    ended_early=(  # the future ended, which changed more than the reward did
-        f"{_TURNED}, mainly because {{ending:text}} while {{promised:rewards}} were still expected."
-    ),
-    other_reward=(
-        f"{_TURNED}, mainly because {{reward:paid}} came where {{expected:number}} was expected."
-    ),
-    no_reward=f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
-    other_belief=(  # of a later component
-        "After {action} at {step:step} it expected {gap:number} {much:text} than before, mainly "
-        "because what it expects {component:when} went from {was:number} to {now:number}."
-    ),
-    spread_out=(  # half of what speaks for the outcome lies at a step or before
-        "After {action} at {step:step} it expected {gap:number} {much:text} than before, spread "
-        "over many steps: half of it {by:within}."
-    ),
-    put_off=(
-        "{action} at {step:step} delayed {worth:rewards}: they were to come {origin:when}, and now "
-        f"{{to:when}}; {_ALIKE}"
-    ),
-    brought_forward=(
-        "{action} at {step:step} brought {worth:rewards} forward: they were to come {origin:when}, "
-        f"and now {{to:when}}; {_ALIKE}"
-    ),
-    exchanged=(
-        "{action} at {step:step} gained {gain:number} {up:when} and lost {loss:number} "
-        f"{{down:when}}; {_ALIKE}"
-    ),
-)
-def turns(played: Played) -> tuple[Found, ...]:
-    return _turns(played)
+EPISODES.kinds(_SAYS)(_turns)
 
 
 def _turn(played: Played, row: int) -> Found:
@@ -79,18 +78,17 @@ def _turn(played: Played, row: int) -> Found:
         is_over = played.episode.terminated and of.last[row] == len(played.episode) - 1
         ending = "the episode ended" if is_over else "a life was lost"
         return "ended-early", about | {"ending": ending, "promised": float(before[1:].sum())}
-    peak = focus(directed)
-    if peak == 0:
-        expected = {"expected": float(before[0])}
-        if after[0] == 0.0:
-            return "no-reward", about | expected
-        return "other-reward", about | expected | {"reward": float(after[0])}
-    if peak is not None:
-        was, now = float(before[peak]), float(after[peak])
+    peak, speaks_for_it = int(directed.argmax()), np.maximum(directed, 0.0)
+    if not directed[peak] >= FOCUS * speaks_for_it.sum():
+        so_far = speaks_for_it.cumsum()
+        half = int((so_far >= so_far[-1] / 2.0).argmax())
+        return "spread-out", about | {"by": (half + 1) * played.episode.time_axis.width - 1}
+    was, now = float(before[peak]), float(after[peak])
+    if peak > 0:
         return "other-belief", about | {"component": peak, "was": was, "now": now}
-    so_far = np.maximum(directed, 0.0).cumsum()
-    half = int((so_far >= so_far[-1] / 2.0).argmax())
-    return "spread-out", about | {"by": (half + 1) * played.episode.time_axis.width - 1}
+    if now == 0.0:
+        return "no-reward", about | {"expected": was}
+    return "other-reward", about | {"expected": was, "reward": now}
 
 
 def _shift(
@@ -107,15 +105,6 @@ def _shift(
         return "exchanged", about | {"up": up, "gain": gain, "down": down, "loss": loss}
     kind = "put-off" if to > origin else "brought-forward"
     return kind, about | {"worth": worth, "origin": origin, "to": to}
-
-
-def focus(directed: FloatArray) -> int | None:
-    """Returns the component that changed most in a direction, None if many changed as much.
-
-    What is above 0 of the change `[N+1]` speaks for the outcome.
-    """
-    peak = int(directed.argmax())
-    return peak if directed[peak] >= FOCUS * np.maximum(directed, 0.0).sum() else None
 
 
 def moved_between(change: FloatArray) -> tuple[int, int, float]:

@@ -77,8 +77,12 @@ def either_or(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.kinds(
-    likely_over="With {action}, there is {chance:chance} that the episode ends {last_step:within}.",
-    surely_over="With {action}, the episode ends {last_step:within}.",
+    {
+        "likely-over": (
+            "With {action}, there is {chance:chance} that the episode ends {last_step:within}."
+        ),
+        "surely-over": "With {action}, the episode ends {last_step:within}.",
+    }
 )
 def over(choice: Choice) -> Iterator[Found]:
     """The first component at whose beginning the episode has more likely ended than not."""

@@ -48,9 +48,8 @@ def contrast(choice: Choice) -> list[Claim]:
 def in_brief(choice: Choice) -> list[Claim]:
     """Returns who is ahead and why, and what the discount has to do with it."""
     told = contrast(choice)
-    kinds = [claim.kind for claim in told]
     brief = told[:1] + [c for c in told[1:] if c.kind in ("overtakes", "makes-up")]
-    if {"better-by-discount", "better-against-total"} & set(kinds):
+    if any(claim.kind in _BY_DISCOUNT[1:] for claim in told):
         return brief + [c for c in told if c.kind in _BY_DISCOUNT]
     return brief + [c for c in told if c.kind in ("better", "equal-values") and c not in brief]
 
@@ -59,12 +58,14 @@ _BY_DISCOUNT = ("different-totals", "better-by-discount", "better-against-total"
 
 
 @CHOICES.kinds(
-    equal_totals="Both bring {total:number} in total{averages:averages}{ties:ties}.",
-    different_totals=(
-        "In total {more} brings {more_total:number} and {less} {less_total:number}"
-        "{averages:averages}{ties:ties}."
-    ),
-    no_total="The rewards after {action} may never end, so there is no total.",
+    {
+        "equal-totals": "Both bring {total:number} in total{averages:averages}{ties:ties}.",
+        "different-totals": (
+            "In total {more} brings {more_total:number} and {less} "
+            "{less_total:number}{averages:averages}{ties:ties}."
+        ),
+        "no-total": "The rewards after {action} may never end, so there is no total.",
+    }
 )
 def totals(choice: Choice) -> Iterator[Found]:
     """What is paid in total."""
@@ -83,20 +84,22 @@ def totals(choice: Choice) -> Iterator[Found]:
 
 
 @CHOICES.kinds(
-    better_by_discount=(
-        "Both pay {total:number} in total{average:average}, but each step of waiting makes a "
-        "reward count {loss:percent} less: {better} is worth {better_value:number}, {worse} "
-        "{worse_value:number}."
-    ),
-    better_against_total=(
-        "But each step of waiting makes a reward count {loss:percent} less: {better} is worth "
-        "{better_value:number}, {worse} {worse_value:number}."
-    ),
-    better=(
-        "All steps counted, {better} is worth {better_value:number} and {worse} is worth "
-        "{worse_value:number} (γ = {gamma:given})."
-    ),
-    equal_values="{action} and {foil} are worth the same: {value:number}.",
+    {
+        "better-by-discount": (
+            "Both pay {total:number} in total{average:average}, but each step of waiting makes a "
+            "reward count {loss:percent} less: {better} is worth {better_value:number}, {worse} "
+            "{worse_value:number}."
+        ),
+        "better-against-total": (
+            "But each step of waiting makes a reward count {loss:percent} less: {better} is worth "
+            "{better_value:number}, {worse} {worse_value:number}."
+        ),
+        "better": (
+            "All steps counted, {better} is worth {better_value:number} and {worse} is worth "
+            "{worse_value:number} (γ = {gamma:given})."
+        ),
+        "equal-values": "{action} and {foil} are worth the same: {value:number}.",
+    }
 )
 def values(choice: Choice) -> Iterator[Found]:
     """What the totals are worth now."""
@@ -115,8 +118,12 @@ def values(choice: Choice) -> Iterator[Found]:
 
 
 @CHOICES.kinds(
-    nothing_at_all="Nothing is expected of any action here.",
-    nothing_on_average="On average no action pays anything here, but single episodes differ.",
+    {
+        "nothing-at-all": "Nothing is expected of any action here.",
+        "nothing-on-average": (
+            "On average no action pays anything here, but single episodes differ."
+        ),
+    }
 )
 def nothing(choice: Choice) -> Iterator[Found]:
     if not choice.moment.decomposition.components.any():
@@ -126,10 +133,12 @@ def nothing(choice: Choice) -> Iterator[Found]:
 
 
 @CHOICES.kinds(
-    same_rewards=(
-        "{action} and {foil} lead to the same rewards at the same times{averages:averages}."
-    ),
-    same_components="Nothing in these numbers tells {action} and {foil} apart.",
+    {
+        "same-rewards": (
+            "{action} and {foil} lead to the same rewards at the same times{averages:averages}."
+        ),
+        "same-components": "Nothing in these numbers tells {action} and {foil} apart.",
+    }
 )
 def alike(choice: Choice) -> Iterator[Found]:
     """Rewards are the same where all that comes is told step by step."""
@@ -183,18 +192,20 @@ def decided_at(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.kinds(
-    more_immediate=(
-        "{leader} gives more immediate rewards: {leader_sum:number} {last_step:within}, where "
-        "{other} {other_sum:gives}{averages:averages}."
-    ),
-    costs_less=(
-        "{leader} costs less: {leader_cost:size} {last_step:within}, where {other} costs "
-        "{other_cost:number}{averages:averages}."
-    ),
-    pays_more=(
-        "{last_step:within} {leader} {leader_sum:gains} and {other} {other_sum:gains}"
-        "{averages:averages}."
-    ),
+    {
+        "more-immediate": (
+            "{leader} gives more immediate rewards: {leader_sum:number} {last_step:within}, where "
+            "{other} {other_sum:gives}{averages:averages}."
+        ),
+        "costs-less": (
+            "{leader} costs less: {leader_cost:size} {last_step:within}, where {other} costs "
+            "{other_cost:number}{averages:averages}."
+        ),
+        "pays-more": (
+            "{last_step:within} {leader} {leader_sum:gains} and {other} "
+            "{other_sum:gains}{averages:averages}."
+        ),
+    }
 )
 def leads(choice: Choice) -> Iterator[Found]:
     """Who leads, be it by rewards that come soon, by nothing but lower costs, or otherwise."""
@@ -207,14 +218,16 @@ def leads(choice: Choice) -> Iterator[Found]:
 
 
 @CHOICES.kinds(
-    overtakes=(
-        "After {count:first} {leader} has overtaken {other}: added up, it {leader_sum:gains} "
-        "and {other} {other_sum:gains}{averages:averages}."
-    ),
-    makes_up=(
-        "But what comes {component:when} decides: {leader} pays {more:number} more then than "
-        "{other}{averages:averages}."
-    ),
+    {
+        "overtakes": (
+            "After {count:first} {leader} has overtaken {other}: added up, it {leader_sum:gains} "
+            "and {other} {other_sum:gains}{averages:averages}."
+        ),
+        "makes-up": (
+            "But what comes {component:when} decides: {leader} pays {more:number} more then than "
+            "{other}{averages:averages}."
+        ),
+    }
 )
 def turns(choice: Choice) -> Iterator[Found]:
     """Where the running total of one action passes the other's, at a step or at the residual."""

@@ -86,13 +86,12 @@ def _uncertainty(table: ExactTable, state: int) -> Uncertainty | None:
         return None
     known = spread(table)
     steps = axis.num_steps if axis.width == 1 else 0
+    paid = (outcomes(mdp, policy, state, action, steps) for action in range(mdp.num_actions))
     return Uncertainty(
         deviation=known.deviation[state],
         return_deviation=np.sqrt(known.return_variance[state]),
         survival=known.survival[state],
-        outcomes=tuple(
-            tuple(outcomes(mdp, policy, state, action, steps)) for action in range(mdp.num_actions)
-        ),
+        outcomes=tuple(map(tuple, paid)),
     )
 
 

@@ -47,12 +47,16 @@ def forecast(choice: Choice) -> list[Claim]:
 
 
 @CHOICES.kinds(
-    earns_nothing="Nothing is expected of {action}, at any step.",
-    zero_on_average="{action} pays nothing on average at any step, but single episodes differ.",
-    all_beyond=(
-        "{action} pays nothing {last_step:within}; what comes later is worth {value:number}."
-    ),
-    nothing_before="Nothing is expected of {action} {last_step:within}.",
+    {
+        "earns-nothing": "Nothing is expected of {action}, at any step.",
+        "zero-on-average": (
+            "{action} pays nothing on average at any step, but single episodes differ."
+        ),
+        "all-beyond": (
+            "{action} pays nothing {last_step:within}; what comes later is worth {value:number}."
+        ),
+        "nothing-before": "Nothing is expected of {action} {last_step:within}.",
+    }
 )
 def silence(choice: Choice) -> Iterator[Found]:
     moment, action, axis, row = choice.moment, choice.action, choice.time_axis, _row(choice)
@@ -77,22 +81,24 @@ def next_to_nothing(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.kinds(
-    first_reward=(
-        "With {action}, the first {effect:text} comes {component:when}: it is {worth:worth}"
-        "{amount:number}."
-    ),
-    first_chance=(
-        "With {action}, a {effect:text} of {amount:number} can come {component:when}"
-        "{earliest:text}; the chance that it comes then is {chance:percent}."
-    ),
-    first_of_several=(
-        "With {action}, a {effect:text} can come {component:when}{earliest:text}; the chance that "
-        "it comes then is {chance:percent}."
-    ),
-    first_expected=(
-        "With {action}, the first {effect:text} to expect comes {component:when}: {worth:worth}"
-        "{amount:number} on average."
-    ),
+    {
+        "first-reward": (
+            "With {action}, the first {effect:text} comes {component:when}: it is "
+            "{worth:worth}{amount:number}."
+        ),
+        "first-chance": (
+            "With {action}, a {effect:text} of {amount:number} can come "
+            "{component:when}{earliest:text}; the chance that it comes then is {chance:percent}."
+        ),
+        "first-of-several": (
+            "With {action}, a {effect:text} can come {component:when}{earliest:text}; the chance "
+            "that it comes then is {chance:percent}."
+        ),
+        "first-expected": (
+            "With {action}, the first {effect:text} to expect comes {component:when}: "
+            "{worth:worth}{amount:number} on average."
+        ),
+    }
 )
 def firsts(choice: Choice) -> Iterator[Found]:
     """Yields the first reward and the first cost that stand out, the earlier one first.

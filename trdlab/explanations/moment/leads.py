@@ -83,24 +83,17 @@ def _count(choice: Choice, lead: Fields) -> int:
 
 def is_immediate(choice: Choice, lead: Fields) -> bool:
     """Returns whether a lead is one of rewards that come soon, with no cost among them."""
-    return (
-        _count(choice, lead) <= _soon(choice)
-        and lead["other_sum"] >= 0.0
-        and not has_costs(choice, lead)
-    )
+    count, names = _count(choice, lead), (lead["leader"], lead["other"])
+    rows = np.stack([choice.moment.components(name)[:count] for name in names])
+    # costs count that change the sums as they are printed
+    is_seen = choice.moment.is_exact and (rows < -_SEEN * abs(lead["leader_sum"])).any()
+    has_costs = is_seen or (_notable(choice, lead) < 0.0).any()
+    return bool(count <= _soon(choice) and lead["other_sum"] >= 0.0 and not has_costs)
 
 
 def are_costs(choice: Choice, lead: Fields) -> bool:
     """Returns whether nothing but costs stands out up to a lead."""
     return bool(lead["leader_sum"] <= 0.0 and not (_notable(choice, lead) > 0.0).any())
-
-
-def has_costs(choice: Choice, lead: Fields) -> bool:
-    """Returns whether costs change the sums up to a lead, as they are printed."""
-    count, names = _count(choice, lead), (lead["leader"], lead["other"])
-    rows = np.stack([choice.moment.components(name)[:count] for name in names])
-    seen = choice.moment.is_exact and (rows < -_SEEN * abs(lead["leader_sum"])).any()
-    return bool(seen or (_notable(choice, lead) < 0.0).any())
 
 
 def _notable(choice: Choice, lead: Fields) -> FloatArray:

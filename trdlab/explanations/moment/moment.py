@@ -250,7 +250,6 @@ class Choice:
 CHOICES = Language[Choice](
     "this moment", lambda choice: forms_of(choice.time_axis, choice.moment.seconds_per_step)
 )
-"""What there is to say of a choice."""
 
 
 def moment_of(estimator: Estimator, observation: Any, action_names: Sequence[str]) -> Moment:

@@ -94,37 +94,39 @@ def tried(trial: Trial) -> Iterator[Fields]:
 
 
 @TRIALS.kinds(
-    came_exactly=(
-        "As forecast, {more} {component:paid} {said:number} more than {less}{component:at}."
-    ),
-    came_as_forecast=(
-        "As forecast, {more} {component:paid} {came:estimate} more than {less}{component:at}; "
-        "{said:number} was forecast."
-    ),
-    by_another_amount=(
-        "{more} {component:paid} {came:estimate} more than {less}{component:at}, {than:text} than "
-        "the {said:number} that was forecast."
-    ),
-    less_than_forecast=(
-        "{more} {component:paid} at most {most:number} more than {less}{component:at}, less than "
-        "the {said:number} that was forecast."
-    ),
-    against_the_forecast=(
-        "Against the forecast, {less} {component:paid} {ahead:estimate} more than {more}"
-        "{component:at}; {more} was to be {said:number} ahead."
-    ),
-    no_difference=(
-        "Against the forecast, {more} {component:paid} no more than {less}{component:at}; "
-        "{said:number} more was forecast."
-    ),
-    too_few_tries=(
-        "Trying each {copies:times} was too few to tell whether {more} {component:pays} more than "
-        "{less}{component:at}; about {enough:count} would do."
-    ),
-    too_close_to_tell=(
-        "Trying cannot tell whether {more} {component:pays} more than {less}{component:at}: they "
-        "are too close."
-    ),
+    {
+        "came-exactly": (
+            "As forecast, {more} {component:paid} {said:number} more than {less}{component:at}."
+        ),
+        "came-as-forecast": (
+            "As forecast, {more} {component:paid} {came:estimate} more than {less}{component:at}; "
+            "{said:number} was forecast."
+        ),
+        "by-another-amount": (
+            "{more} {component:paid} {came:estimate} more than {less}{component:at}, {than:text} "
+            "than the {said:number} that was forecast."
+        ),
+        "less-than-forecast": (
+            "{more} {component:paid} at most {most:number} more than {less}{component:at}, less "
+            "than the {said:number} that was forecast."
+        ),
+        "against-the-forecast": (
+            "Against the forecast, {less} {component:paid} {ahead:estimate} more than "
+            "{more}{component:at}; {more} was to be {said:number} ahead."
+        ),
+        "no-difference": (
+            "Against the forecast, {more} {component:paid} no more than {less}{component:at}; "
+            "{said:number} more was forecast."
+        ),
+        "too-few-tries": (
+            "Trying each {copies:times} was too few to tell whether {more} {component:pays} more "
+            "than {less}{component:at}; about {enough:count} would do."
+        ),
+        "too-close-to-tell": (
+            "Trying cannot tell whether {more} {component:pays} more than {less}{component:at}: "
+            "they are too close."
+        ),
+    }
 )
 def outcomes(trial: Trial) -> Iterator[Found]:
     """Whether what was forecast came; `more` is what was forecast to be ahead, by `said` > 0."""

@@ -8,7 +8,6 @@ from trdlab.arrays import FloatArray
 from trdlab.explanations.moment.moment import CHOICES, Choice, Moment
 from trdlab.explanations.moment.steps import (
     SHARE,
-    effect_of,
     explicit_end,
     largest,
     shares,
@@ -60,7 +59,7 @@ def peak(choice: Choice) -> Iterator[Fields]:
     is_alone = bool((np.delete(sizes, i) < sizes[i]).all())
     if is_alone and (moment.is_exact or i in peaks(moment, action)):
         value = float(moment.components(action)[i])
-        yield _about(choice) | {"effect": effect_of(value), "component": i, "discounted": value}
+        yield _about(choice) | {"component": i, "discounted": value}
 
 
 @CHOICES.rule("{last_step:within} the {effect:text} expected of {action} peaks {components:whens}.")
@@ -115,9 +114,10 @@ def spread(choice: Choice) -> Iterator[Fields]:
 
 def _about(choice: Choice) -> Fields:
     moment, action = choice.moment, choice.action
+    most = undiscounted(moment, action)[largest(moment, action)]
     return {
         "action": action,
-        "effect": effect_of(undiscounted(moment, action)[largest(moment, action)]),
+        "effect": "reward" if most > 0.0 else "cost",
         "last_step": explicit_end(moment, action) * choice.time_axis.width - 1,
     }
 

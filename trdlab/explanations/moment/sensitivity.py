@@ -13,7 +13,7 @@ from trdlab.explanations.moment.moment import CHOICES, Choice, WhatIf
 from trdlab.explanations.rules import Claim, Fields, Found, every
 from trdlab.formatting import digits_to_tell, plain, said
 
-SAMPLES = 64
+SAMPLES = 64  # pieces into which an interval is cut at first
 _PRECISION = 1e-13
 _DIP_STEPS = 34  # each leaves _GOLDEN of an interval: a ten-millionth in the end
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
@@ -31,24 +31,18 @@ def sensitivity(choice: Choice) -> list[Claim]:
     return every(choice, flips, *in_all, searched)
 
 
-def find_flips(gap: Gap, low: float, high: float, *, samples: int = SAMPLES) -> tuple[float, ...]:
+def find_flips(gap: Gap, low: float, high: float) -> tuple[float, ...]:
     """Returns the values between `low` and `high` at which `gap` changes its sign, in order.
 
-    The interval is sampled evenly and each sign change is refined. Where |gap| dips between
-    three samples of one sign, or towards an end of the interval, its bottom is sought too, for a
-    pair of flips may hide there. A gap that touches zero without crossing it is no flip. Samples
-    prove nothing about what lies between them.
-
-    Args:
-        gap: a continuous function, for example Q(action) − Q(foil) as γ varies.
-        low: the lower end.
-        high: the upper end.
-        samples: into how many pieces the interval is cut at first.
+    The gap is continuous. The interval is sampled evenly and each sign change is refined. Where
+    |gap| dips between three samples of one sign, or towards an end of the interval, its bottom is
+    sought too, for a pair of flips may hide there. A gap that touches zero without crossing it is
+    no flip. Samples prove nothing about what lies between them.
 
     >>> [round(x, 6) for x in find_flips(lambda x: x * x - 0.25, -1, 1)]
     [-0.5, 0.5]
     """
-    known = {float(x): gap(float(x)) for x in np.linspace(low, high, samples + 1)}
+    known = {float(x): gap(float(x)) for x in np.linspace(low, high, SAMPLES + 1)}
     known |= {x: gap(x) for x in _beside_zeros(known)}
     known = dict(sorted(known.items()))
     known |= {x: gap(x) for x in _bottoms(gap, known)}
@@ -158,8 +152,14 @@ def flips(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.kinds(
-    never_flips="No value that was tried for {quantity:text} makes {worse} better than {better}.",
-    several_flips="In all, the preference changes at these values of {quantity:text}: {at:roots}.",
+    {
+        "never-flips": (
+            "No value that was tried for {quantity:text} makes {worse} better than {better}."
+        ),
+        "several-flips": (
+            "In all, the preference changes at these values of {quantity:text}: {at:roots}."
+        ),
+    }
 )
 def in_all(choice: Choice) -> Iterator[Found]:
     """Quantities that never flip it, or more often than at the nearest values."""

@@ -41,11 +41,6 @@ def undiscounted(moment: Moment, action: str) -> FloatArray:
     return moment.components(action)[:end] / moment.time_axis.discounts[:end]
 
 
-def effect_of(value: float) -> str:
-    """Returns what a reward is called."""
-    return "reward" if value > 0.0 else "cost"
-
-
 def stands_out(moment: Moment, action: str) -> BoolArray:
     """Returns `[K]`: which of the trusted explicit components are more than noise (see `least`)."""
     size = np.abs(undiscounted(moment, action))

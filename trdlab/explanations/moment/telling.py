@@ -60,14 +60,16 @@ def no_alternative(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.kinds(
-    tied_actions=(
-        "{actions:names} are equally good here, but pay other amounts or at other times; the agent "
-        "{takes:text}."
-    ),
-    tied_later=(
-        "In {states:states} to come several actions are equally good: totals and times depend on "
-        "which is taken."
-    ),
+    {
+        "tied-actions": (
+            "{actions:names} are equally good here, but pay other amounts or at other times; the "
+            "agent {takes:text}."
+        ),
+        "tied-later": (
+            "In {states:states} to come several actions are equally good: totals and times depend "
+            "on which is taken."
+        ),
+    }
 )
 def ties(choice: Choice) -> Iterator[Found]:
     moment = choice.moment
@@ -80,9 +82,11 @@ def ties(choice: Choice) -> Iterator[Found]:
 
 
 @CHOICES.kinds(
-    decided_by="After the first action, {policy:text} acts.",
-    signs_count="Of each reward only the sign counts.",
-    ended_by="All steps count, up to {ending:text}.",
+    {
+        "decided-by": "After the first action, {policy:text} acts.",
+        "signs-count": "Of each reward only the sign counts.",
+        "ended-by": "All steps count, up to {ending:text}.",
+    }
 )
 def future(choice: Choice) -> Iterator[Found]:
     of = choice.moment.future

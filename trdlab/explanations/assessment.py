@@ -22,14 +22,11 @@ from trdlab.rollouts.playing import Playing, Watch, part_of, unwatched
 from trdlab.statistics import FEWEST_EPISODES
 from trdlab.tabular import ExactTable
 
-FOLLOWED = 100
-"""Steps for which two actions that are tried are followed at least."""
-
-LOST = (
+FOLLOWED = 100  # steps for which two actions that are tried are followed at least
+LOST = (  # where the states of an environment cannot be copied
     "So nothing tells how well anybody could forecast here, nor how well the agent forecasts "
     "actions that it would not take."
 )
-"""What is lost where the states of an environment cannot be copied."""
 
 _FIRST = 0.2  # of the episodes, by which it is seen whether all are alike
 

@@ -87,19 +87,15 @@ class Explanation(Printable):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """All that was asked for, or all there is, by the question that it answers."""
-        told: list[Section] = []
-        if self.choice is not None:
-            told += telling.sections(self.choice)
-        if self.trial is not None:
-            told += outcome.sections(self.trial)
-        if self.story is not None:
-            told.append(self.story.section(self.seed))
-        if self.report is not None:
-            told += calibration.sections(self.report)
-        if self.missing:
-            told.append(Section("missing", "What is not known", notes=self.missing))
+        told = [
+            *([] if self.choice is None else telling.sections(self.choice)),
+            *([] if self.trial is None else outcome.sections(self.trial)),
+            *([] if self.story is None else [self.story.section(self.seed)]),
+            *([] if self.report is None else calibration.sections(self.report)),
+        ]
         wanted = [name for part in self.parts or PARTS for name in _OF_PART[part]]
-        return tuple(part for part in told if part.name in wanted or part.name == "missing")
+        missing = Section("missing", "What is not known", notes=self.missing)
+        return tuple(part for part in told if part.name in wanted) + (missing,) * bool(missing)
 
 
 def parse_parts(text: str | None) -> tuple[Part, ...]:

@@ -17,10 +17,9 @@ import numpy as np
 from trdlab.errors import TrdlabError
 from trdlab.formatting import digits_to_tell
 
-E = TypeVar("E")
-"""The evidence that sentences speak of."""
-
+E = TypeVar("E")  # the evidence that sentences speak of
 Fields = dict[str, Any]
+Found = tuple[str, Fields]  # the kind of a claim, and its fields
 _SLOT = re.compile(r"\{(\w+)(?::(\w+))?\}")
 
 
@@ -135,19 +134,20 @@ class Language(Generic[E]):
         return made
 
     def kinds(
-        self, says: Mapping[str, str]
-    ) -> Callable[[Callable[[E], Iterable[tuple[str, Fields]]]], tuple[Rule[E], ...]]:
+        self, says: Mapping[str, str], *, holds: Callable[..., bool] | None = None
+    ) -> Callable[[Callable[[E], Iterable[Found]]], tuple[Rule[E], ...]]:
         """Makes rules of a function that finds claims of several kinds: each kind and its numbers.
 
         Args:
             says: of each kind its sentence.
+            holds: as of `rule`.
         """
 
-        def made(find: Callable[[E], Iterable[tuple[str, Fields]]]) -> tuple[Rule[E], ...]:
+        def made(find: Callable[[E], Iterable[Found]]) -> tuple[Rule[E], ...]:
             def of(kind: str) -> Callable[[E], list[Fields]]:
                 return lambda evidence: [found for own, found in find(evidence) if own == kind]
 
-            return tuple(self.rule(text, kind=kind)(of(kind)) for kind, text in says.items())
+            return tuple(self.rule(says[kind], kind=kind, holds=holds)(of(kind)) for kind in says)
 
         return made
 

@@ -6,8 +6,7 @@ from typing import Any
 
 from trdlab.explanations.rules import Claim
 
-MOST_AT_FIRST = 5
-"""Sentences that are told where nobody has asked for details."""
+MOST_AT_FIRST = 5  # sentences, where nobody has asked for details
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from trdlab.decomposition import TimeAxis
-from trdlab.explanations.moment.exact import gamma_what_ifs, gridworld_moment, tabular_moment
+from trdlab.explanations.moment.exact import exact_moment
 from trdlab.explanations.moment.moment import Choice
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.printable import Printable
@@ -74,8 +74,7 @@ def solve_gridworld(
     world = Gridworld(grid)
     index = world.find_state(state)
     table = exact(world.mdp, time_axis, ties=ties)
-    moment = gridworld_moment(world, table, index)
-    return SolvedState(world, table, index, moment.choice(action, foil))
+    return SolvedState(world, table, index, exact_moment(world, table, index).choice(action, foil))
 
 
 def solve_tabular(
@@ -107,5 +106,4 @@ def solve_tabular(
     world = make_world(env_id, dict(arguments or {}))
     index = world.mdp.start if state is None else world.find_state(state)
     table = exact(world.mdp, time_axis, ties=ties)
-    moment = tabular_moment(table, index, world.action_names, gamma_what_ifs(table, index))
-    return SolvedState(world, table, index, moment.choice(action, foil))
+    return SolvedState(world, table, index, exact_moment(world, table, index).choice(action, foil))

@@ -8,8 +8,6 @@ from trdlab.formatting import percent, plain, said, significant
 from trdlab.statistics import Estimate
 from trdlab.time_axis import TimeAxis
 
-__all__ = ["counted", "forms_of", "joined"]
-
 
 @cache
 def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
@@ -22,11 +20,7 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     Time, where the action is the first step: `when` (a component: at once, 3 steps later, after the
     first 4 steps), `whens` (several), `span` (from one to another), `within` (up to a step: in the
     first 4 steps), `first` (so many: the first 4 steps), `step` (of an episode).
-    Names: `action`, `names`, `text`.
-
-    Args:
-        axis: what components mean.
-        seconds: how long a step takes as people play, if that is known.
+    Names: `action`, `names`, `text`. With `seconds`, times are told in both.
     """
 
     def span(components: tuple[int, int]) -> str:

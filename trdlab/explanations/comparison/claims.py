@@ -7,36 +7,31 @@ import numpy as np
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration.claims import in_brief as in_brief_of_report
 from trdlab.explanations.comparison.comparison import COMPARISONS, SIDES, Comparison
-from trdlab.explanations.rules import Claim, Fields, every, first
+from trdlab.explanations.rules import Claim, Fields, Found, every, first
 from trdlab.explanations.sections import Section, at_first
 
-MOST = 0.5
-"""More than this share of a difference is most of it."""
-NOTABLE = 0.05
-"""The least lead, as a share of all that is expected, that makes one agent later worth telling."""
-FURTHEST = 3
-"""How many of the largest disagreements are told."""
+MOST = 0.5  # more than this share of a difference is most of it
+NOTABLE = 0.05  # of all that is expected: the least lead to call one agent later
+FURTHEST = 3  # of the largest disagreements are told
 
 
 def in_brief(comparison: Comparison) -> list[Claim]:
     """Returns who expects more, when, whether they would do the same, and whom to trust."""
-    told = _how_much(comparison) + _when(comparison)[:1] + every(comparison, agreement)
-    trust = [every(comparison, trusted)[i:][1:2] for i in _begins(comparison)]
-    return list(at_first([*told, *(claim for claims in trust for claim in claims)]))
-
-
-def _begins(comparison: Comparison) -> list[int]:
-    """Returns where what is said of the reports of A, and of B, begins."""
-    sides = [claim.side for claim in every(comparison, trusted)]
-    return [sides.index(side) for side in SIDES if side in sides]
+    told = [*first(comparison, nothing_differs, *how_much), *_when(comparison)[:1]]
+    told += every(comparison, agreement)
+    said = every(comparison, trusted)
+    sides = [claim.side for claim in said]
+    begins = [sides.index(side) for side in SIDES if side in sides]
+    return list(at_first([*told, *(claim for i in begins for claim in said[i + 1 : i + 2])]))
 
 
 def sections(comparison: Comparison) -> tuple[Section, ...]:
     """Returns all there is to say of a comparison, by the question that it answers."""
+    differences = first(comparison, nothing_differs, *how_much) + _when(comparison)
     apart = every(comparison, agreement, of_any_action, furthest_apart)
     grounds = every(comparison, each_tells, one_tells, compared_at, some_cut_off, all_alike)
     parts = (
-        Section("differences", "Who expects more, and when", tuple(_differences(comparison))),
+        Section("differences", "Who expects more, and when", tuple(differences)),
         Section("states", "Where they are furthest apart", tuple(apart)),
         Section("trust", "How far to trust each", tuple(every(comparison, trusted))),
         Section("grounds", "What this rests on", tuple(grounds)),
@@ -44,20 +39,9 @@ def sections(comparison: Comparison) -> tuple[Section, ...]:
     return tuple(part for part in parts if part)
 
 
-def _differences(comparison: Comparison) -> list[Claim]:
-    return _how_much(comparison) + _when(comparison)
-
-
-def _how_much(comparison: Comparison) -> list[Claim]:
-    return first(comparison, nothing_differs, same_in_all, expects_more, neither_surely_more)
-
-
 def _when(comparison: Comparison) -> list[Claim]:
-    later = first(comparison, later_rewards, later_costs, come_by)
-    return every(comparison, largest_at, most_of_it) + later
-
-
-# ---- how much ----------------------------------------------------------------------------------
+    when = every(comparison, largest_at, most_of_it)
+    return when + first(comparison, *later, come_by)
 
 
 @COMPARISONS.rule("They expect the same of every action, at every state they were compared at.")
@@ -66,39 +50,35 @@ def nothing_differs(comparison: Comparison) -> Iterator[Fields]:
         yield {}
 
 
-@COMPARISONS.rule(
-    "Both expect {value:number} on average, though not the same of every action at every state."
+@COMPARISONS.kinds(
+    {
+        "same-in-all": (
+            "Both expect {value:number} on average, though not the same of every action at every "
+            "state."
+        ),
+        "expects-more": (
+            "{more:text} expects more than {less:text}: {more_value:number} against "
+            "{less_value:number} on average."
+        ),
+        "neither-surely-more": (
+            "A expects {first_value:number} on average and B {second_value:number}; with other "
+            "episodes it could be the other way round."
+        ),
+    }
 )
-def same_in_all(comparison: Comparison) -> Iterator[Fields]:
-    if comparison.gap.value == 0.0 and comparison.visits.of_any_action.any():
-        yield {"value": float(values(comparison)[0])}
-
-
-@COMPARISONS.rule(
-    "{more:text} expects more than {less:text}: {more_value:number} against {less_value:number} "
-    "on average."
-)
-def expects_more(comparison: Comparison) -> Iterator[Fields]:
-    """Other episodes would hardly turn that round."""
-    gap, worth = comparison.gap, values(comparison)
-    if gap.value != 0.0 and not gap.low <= 0.0 <= gap.high:
-        more = int(gap.value > 0.0)
-        yield {
-            "more": SIDES[more],
-            "less": SIDES[1 - more],
-            "more_value": float(worth[more]),
-            "less_value": float(worth[1 - more]),
-        }
-
-
-@COMPARISONS.rule(
-    "A expects {first_value:number} on average and B {second_value:number}; with other episodes "
-    "it could be the other way round."
-)
-def neither_surely_more(comparison: Comparison) -> Iterator[Fields]:
-    gap, worth = comparison.gap, values(comparison)
-    if gap.value != 0.0 and gap.low <= 0.0 <= gap.high:
-        yield {"first_value": float(worth[0]), "second_value": float(worth[1])}
+def how_much(comparison: Comparison) -> Iterator[Found]:
+    """Who expects more in all, if other episodes would hardly turn that round."""
+    gap, worth = comparison.gap, comparison.visits.expected.mean(axis=1).sum(axis=1)  # [2]
+    if gap.value == 0.0:
+        if comparison.visits.of_any_action.any():
+            yield "same-in-all", {"value": float(worth[0])}
+    elif gap.low <= 0.0 <= gap.high:
+        values = {"first_value": float(worth[0]), "second_value": float(worth[1])}
+        yield "neither-surely-more", values
+    else:
+        sides, more = _sides(gap.value)
+        values = {"more_value": float(worth[more]), "less_value": float(worth[1 - more])}
+        yield "expects-more", sides | values
 
 
 @COMPARISONS.rule(
@@ -120,9 +100,6 @@ def agreement(comparison: Comparison) -> Iterator[Fields]:
         yield {"share": share}
 
 
-# ---- when --------------------------------------------------------------------------------------
-
-
 @COMPARISONS.rule(
     "They differ most in what comes {component:when}: {more:text} expects {by:number} more of it "
     "than {less:text} on average."
@@ -133,8 +110,7 @@ def largest_at(comparison: Comparison) -> Iterator[Fields]:
     c = int(np.abs(mean).argmax())
     of = comparison.difference[c]
     if comparison.time_axis.horizon and mean[c] != 0.0 and not of.low <= 0.0 <= of.high:
-        more = int(mean[c] > 0.0)
-        sides = {"more": SIDES[more], "less": SIDES[1 - more]}
+        sides, _ = _sides(mean[c])
         yield {"component": c, **sides, "by": abs(float(mean[c]))}
 
 
@@ -159,16 +135,23 @@ _LATER = (
 )
 
 
-@COMPARISONS.rule(_LATER % "rewards")
-def later_rewards(comparison: Comparison) -> Iterator[Fields]:
-    """All they expect on average are rewards."""
-    yield from _later(comparison, 1.0)
-
-
-@COMPARISONS.rule(_LATER % "costs")
-def later_costs(comparison: Comparison) -> Iterator[Fields]:
-    """All they expect on average are costs."""
-    yield from _later(comparison, -1.0)
+@COMPARISONS.kinds({"later-rewards": _LATER % "rewards", "later-costs": _LATER % "costs"})
+def later(comparison: Comparison) -> Iterator[Found]:
+    """At no step has a larger share of the later one's come; all that is expected has one sign."""
+    shift = comparison.shift
+    for sign, shares, c in _apart(comparison):
+        late = int(shares[0, c] > shares[1, c])
+        lead = shares[1 - late] - shares[late]
+        is_sure = shift.value != 0.0 and not shift.low <= 0.0 <= shift.high
+        if is_sure and (shift.value > 0.0) == bool(late) and (lead >= -1e-9).all():
+            fields = {
+                "later": SIDES[late],
+                "sooner": SIDES[1 - late],
+                "last_step": (c + 1) * comparison.time_axis.width - 1,
+                "later_share": float(shares[late, c]),
+                "sooner_share": float(shares[1 - late, c]),
+            }
+            yield "later-rewards" if sign > 0.0 else "later-costs", fields
 
 
 @COMPARISONS.rule(
@@ -177,45 +160,25 @@ def later_costs(comparison: Comparison) -> Iterator[Fields]:
 )
 def come_by(comparison: Comparison) -> Iterator[Fields]:
     """By the step at which these shares differ most."""
-    for sign in (1.0, -1.0):
-        for shares, c in _apart(comparison, sign):
-            last, (one, other) = (c + 1) * comparison.time_axis.width - 1, map(float, shares[:, c])
-            yield {"last_step": last, "first_share": one, "second_share": other}
+    for _, shares, c in _apart(comparison):
+        last, (one, other) = (c + 1) * comparison.time_axis.width - 1, map(float, shares[:, c])
+        yield {"last_step": last, "first_share": one, "second_share": other}
 
 
-def _later(comparison: Comparison, sign: float) -> Iterator[Fields]:
-    """Yields who expects it later: at no step has a larger share of the one's come."""
-    shift = comparison.shift
-    for shares, c in _apart(comparison, sign):
-        later = int(shares[0, c] > shares[1, c])
-        lead = shares[1 - later] - shares[later]
-        is_sure = shift.value != 0.0 and not shift.low <= 0.0 <= shift.high
-        if is_sure and (shift.value > 0.0) == bool(later) and (lead >= -1e-9).all():
-            yield {
-                "later": SIDES[later],
-                "sooner": SIDES[1 - later],
-                "last_step": (c + 1) * comparison.time_axis.width - 1,
-                "later_share": float(shares[later, c]),
-                "sooner_share": float(shares[1 - later, c]),
-            }
+def _apart(comparison: Comparison) -> Iterator[tuple[float, FloatArray, int]]:
+    """Yields a sign; `[2, N]`, the share of what each expects that has come; and where they differ.
 
-
-def _apart(comparison: Comparison, sign: float) -> Iterator[tuple[FloatArray, int]]:
-    """Yields `[2, N]`, the share of what each expects that has come; and where they differ most.
-
-    All means must have the one sign; where they do not, or hardly differ, there is none.
+    All means must have that sign; where they do not, or hardly differ, there is none.
     """
-    means = sign * comparison.visits.expected.mean(axis=1)  # [2, N+1]
-    totals = means.sum(axis=1, keepdims=True)
-    if (means < 0.0).any() or not totals.all() or not comparison.time_axis.horizon:
-        return
-    shares = np.asarray(means.cumsum(axis=1) / totals)[:, :-1]
-    gap = np.abs(shares[0] - shares[1])
-    if gap.max() >= NOTABLE:
-        yield shares, int(gap.argmax())
-
-
-# ---- at which state ----------------------------------------------------------------------------
+    for sign in (1.0, -1.0):
+        means = sign * comparison.visits.expected.mean(axis=1)  # [2, N+1]
+        totals = means.sum(axis=1, keepdims=True)
+        if (means < 0.0).any() or not totals.all() or not comparison.time_axis.horizon:
+            continue
+        shares = np.asarray(means.cumsum(axis=1) / totals)[:, :-1]
+        gap = np.abs(shares[0] - shares[1])
+        if gap.max() >= NOTABLE:
+            yield sign, shares, int(gap.argmax())
 
 
 @COMPARISONS.rule(
@@ -239,9 +202,6 @@ def furthest_apart(comparison: Comparison) -> Iterator[Fields]:
             "second_value": float(worth[1]),
             "second_action": names[1],
         }
-
-
-# ---- whom to trust, and what it rests on -------------------------------------------------------
 
 
 @COMPARISONS.rule("{side:text}: {said:text}")
@@ -292,6 +252,7 @@ def one_tells(comparison: Comparison) -> Iterator[Fields]:
             yield {"side": side, "policy": of.policy, "reward": of.reward, "ending": of.ending}
 
 
-def values(comparison: Comparison) -> FloatArray:
-    """Returns `[2]`: what each expects in all on average."""
-    return np.asarray(comparison.visits.expected.mean(axis=1).sum(axis=1))
+def _sides(difference: float) -> tuple[Fields, int]:
+    """Returns who expects more and who less, and the number of the one who expects more."""
+    more = int(difference > 0.0)
+    return {"more": SIDES[more], "less": SIDES[1 - more]}, more

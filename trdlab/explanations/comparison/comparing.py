@@ -10,9 +10,6 @@ from trdlab.explanations.comparison.comparison import SIDES, Comparison, compare
 from trdlab.explanations.comparison.states import visit
 from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
 
-_EPISODES, _EPISODES_OF_TABLES = 20, 50
-_MOST_STATES = 1_000
-
 
 def compare(
     first: Agent,
@@ -22,7 +19,7 @@ def compare(
     judged_by: int | None = None,
     seed: int = 0,
     max_steps: int | None = None,
-    most_states: int = _MOST_STATES,
+    most_states: int = 1_000,
     watch: Watch = unwatched,
 ) -> Comparison:
     """Compares two agents at states of episodes of both, played where the first one acts.
@@ -44,11 +41,16 @@ def compare(
         InputError: the two do not see or do the same, discount otherwise, or there is no episode.
     """
     tables = first.world is not None and second.world is not None
-    usual = _EPISODES_OF_TABLES if tables else _EPISODES
-    count = usual if episodes is None else episodes
+    count = (50 if tables else 20) if episodes is None else episodes
     if count < 1:
         raise InputError(f"There are {count} episodes.", "Ask for at least 1.")
-    check_comparable(first, second)
+    first.estimator.time_axis.shared(second.estimator.time_axis)  # refuses other discounts
+    if differs := first.interface.unlike(second.interface):
+        raise InputError(
+            f"{first.name} and {second.name} cannot be compared: they have {differs[0]} and "
+            f"{differs[1]}.",
+            "Compare agents that see and do the same.",
+        )
     there = replace(second, make=first.make, origin=None)
     if first.origin and second.origin:
         there = replace(there, origin=second.origin.at(first.origin))
@@ -79,21 +81,6 @@ def compare(
         seconds_per_step=first.seconds_per_step,
         seed=seed,
     )
-
-
-def check_comparable(first: Agent, second: Agent) -> None:
-    """Checks that two agents see and do the same, and discount alike.
-
-    Raises:
-        InputError: they do not.
-    """
-    first.estimator.time_axis.shared(second.estimator.time_axis)
-    if differs := first.interface.unlike(second.interface):
-        raise InputError(
-            f"{first.name} and {second.name} cannot be compared: they have {differs[0]} and "
-            f"{differs[1]}.",
-            "Compare agents that see and do the same.",
-        )
 
 
 def _words(agent: Agent) -> tuple[str, ...]:

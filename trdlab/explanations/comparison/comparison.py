@@ -81,17 +81,10 @@ class Comparison(Printable):
 COMPARISONS = Language[Comparison](
     "this comparison", lambda of: forms_of(of.time_axis, of.seconds_per_step)
 )
-"""What there is to say of a comparison; the two agents are A and B."""
 
 
 def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
-    """Returns the comparison of what two estimators expect at some states.
-
-    Args:
-        visits: that.
-        seed: of the bootstrap.
-        told: the other fields of the comparison.
-    """
+    """Returns how far apart two estimators are at some states; `told` are its other fields."""
     size, actions = visits.time_axis.num_components, visits.actions
     rows = np.concatenate(
         [
@@ -140,12 +133,8 @@ def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
 def centre(means: FloatArray, axis: TimeAxis) -> FloatArray:
     """Returns `[...]`: the mean step at which rewards come, weighted by what they are worth now.
 
-    Each component counts at its first step, so the residual at N·w; NaN where components have two
-    signs or are all zero.
-
-    Args:
-        means: `[..., N+1]`.
-        axis: what the components mean.
+    Of means `[..., N+1]` each component counts at its first step, so the residual at N·w. NaN where
+    components have two signs or are all zero.
 
     >>> centre(np.array([[1.0, 0.0, 3.0], [1.0, -1.0, 0.0]]), TimeAxis(0.9, 2, 5))
     array([7.5, nan])

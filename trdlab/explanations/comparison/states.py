@@ -184,13 +184,10 @@ class _Kept:
 def _played(
     players: tuple[Agent, Agent], player: int, seed: int, max_steps: int | None
 ) -> Iterator[tuple[_Seen, bytes, bool]]:
-    """Plays one episode of a player just as it is explained, so that each of its steps can be.
+    """Yields what was seen at each step of an episode, what was done and paid, and if it was cut.
 
-    The other one looks on, and is asked at every step if it may remember what came before.
-
-    Yields:
-        What was seen at each step, what was done and paid, and whether more could have come of an
-        episode that is not played on.
+    It is played just as it is explained, so that each of its steps can be. The other one looks on,
+    and is asked at every step if it may remember what came before.
     """
     agent, other, memory = players[player], players[1 - player].policy, None
     with closing(agent.make(1, seed)) as environments:

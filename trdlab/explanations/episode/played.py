@@ -73,16 +73,9 @@ def _rounded_up(value: float) -> float:
 
 
 EPISODES = Language[Played]("this episode", _forms)
-"""What there is to say of an episode."""
 
 
 def play(agent: Agent, seed: int = 0, *, max_steps: int | None = None) -> Played:
-    """Returns an episode that an agent's policy plays, without any random actions of ours.
-
-    Args:
-        agent: who plays.
-        seed: of the episode.
-        max_steps: after which it is cut off, if not before.
-    """
+    """Returns an episode that an agent's policy plays, without any random actions of ours."""
     (episode,) = agent.play(1, seed=seed, max_steps=max_steps)
     return Played(episode, agent.action_names, agent.seconds_per_step)

@@ -7,19 +7,13 @@ import numpy as np
 
 from trdlab.arrays import IntArray
 from trdlab.explanations.episode.played import EPISODES, Played
-from trdlab.explanations.rules import Claim, Fields, every
+from trdlab.explanations.rules import Claim, Found, every
 from trdlab.rollouts.episodes import Episode
 from trdlab.rollouts.realised import next_flag
 
-HALF = 0.5
-"""The share of a reward that counts as it, where it is expected and where it comes."""
-LEAST_SPAN = 6
-"""A promise is not called broken after fewer steps than this: chance can delay a reward."""
-SMALLEST_DISCOUNT = 1e-6
-"""A discount smaller than this is not taken out of a component."""
-
-
-# ---- rewards that came as foreseen -------------------------------------------------------------
+HALF = 0.5  # of a reward counts as it, where it is expected and where it comes
+LEAST_SPAN = 6  # steps until a promise is called broken: chance can delay a reward
+SMALLEST_DISCOUNT = 1e-6  # a smaller one is not taken out of a component
 
 
 def foreseen(played: Played) -> list[Claim]:
@@ -27,7 +21,7 @@ def foreseen(played: Played) -> list[Claim]:
 
     There is none where the reward was always the same: then nothing had to be foreseen.
     """
-    claims = every(played, foreseen_fully, foreseen_before)
+    claims = every(played, *told_ahead)
     return sorted(claims, key=lambda claim: (-abs(claim.reward), -claim.steps, claim.step))
 
 
@@ -43,31 +37,26 @@ def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: obje
     return is_told and not (could and _tells(episode, step, steps + 1))
 
 
-@EPISODES.rule(
-    "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as it could be.",
+@EPISODES.kinds(
+    {
+        "foreseen-fully": (
+            "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as it could "
+            "be."
+        ),
+        "foreseen-before": "{reward:paid} at {step:step} was foreseen {steps:steps} before.",
+    },
     holds=_is_foreseen,
 )
-def foreseen_fully(played: Played) -> Iterator[Fields]:
-    """It was foreseen since the future began, or as far ahead as there are explicit components."""
-    yield from (fields for fields in _foreseen(played) if fields["steps"] == fields["limit"])
-
-
-@EPISODES.rule(
-    "{reward:paid} at {step:step} was foreseen {steps:steps} before.", holds=_is_foreseen
-)
-def foreseen_before(played: Played) -> Iterator[Fields]:
-    """It was not foreseen any earlier, although it could have been."""
-    yield from (fields for fields in _foreseen(played) if fields["steps"] < fields["limit"])
-
-
-def _foreseen(played: Played) -> Iterator[Fields]:
+def told_ahead(played: Played) -> Iterator[Found]:
+    """It was foreseen as early as there was a component for it, or not although it could have."""
     episode, rewards = played.episode, played.episode.rewards
     if np.ptp(rewards) == 0.0:
         return
-    steps, limit = _foreseen_steps(episode)  # [T] each
+    steps, limits = _foreseen_steps(episode)  # [T] each
     for at in np.flatnonzero((steps >= 1) & (rewards != 0.0)).tolist():
-        told = {"reward": float(rewards[at]), "step": at, "steps": int(steps[at])}
-        yield told | {"limit": int(limit[at])}
+        fields = {"reward": float(rewards[at]), "step": at, "steps": int(steps[at])}
+        kind = "foreseen-fully" if steps[at] == limits[at] else "foreseen-before"
+        yield kind, fields | {"limit": int(limits[at])}
 
 
 def _can_tell(episode: Episode, step: int, ahead: int) -> bool:
@@ -104,12 +93,9 @@ def _foreseen_steps(episode: Episode) -> tuple[IntArray, IntArray]:
     return steps, limit
 
 
-# ---- promises that were not kept ---------------------------------------------------------------
-
-
 def broken_promises(played: Played) -> list[Claim]:
     """Returns the promises that were not kept in time, the longest first."""
-    claims = every(played, broken_promise, overdue_promise, late_promise)
+    claims = every(played, *overdue)
     return sorted(claims, key=lambda claim: claim.first - claim.last)
 
 
@@ -137,27 +123,16 @@ def _is_overdue(
 _STAYED = "From {first:step} to {last:step} a reward was always {away:text} away"
 
 
-@EPISODES.rule(f"{_STAYED}, and never came.", holds=_is_overdue)
-def broken_promise(played: Played) -> Iterator[Fields]:
-    """It never came, and the episode ended."""
-    if played.episode.terminated:
-        yield from (of for of in _overdue(played) if of["came"] is None)
-
-
-@EPISODES.rule(f"{_STAYED}, and had not come when the episode was cut off.", holds=_is_overdue)
-def overdue_promise(played: Played) -> Iterator[Fields]:
-    """It had not come when the episode was cut off."""
-    if not played.episode.terminated:
-        yield from (of for of in _overdue(played) if of["came"] is None)
-
-
-@EPISODES.rule(f"{_STAYED}, and came only at {{came:step}}.", holds=_is_overdue)
-def late_promise(played: Played) -> Iterator[Fields]:
-    yield from (of for of in _overdue(played) if of["came"] is not None)
-
-
-def _overdue(played: Played) -> Iterator[Fields]:
-    """Yields the stretches of steps at which a promised reward was overdue, and when it came."""
+@EPISODES.kinds(
+    {
+        "broken-promise": f"{_STAYED}, and never came.",
+        "overdue-promise": f"{_STAYED}, and had not come when the episode was cut off.",
+        "late-promise": f"{_STAYED}, and came only at {{came:step}}.",
+    },
+    holds=_is_overdue,
+)
+def overdue(played: Played) -> Iterator[Found]:
+    """The stretches of steps at which a promised reward was overdue, and whether it came."""
     episode, axis = played.episode, played.episode.time_axis
     for first, last, component in _stays(episode):
         kept = _kept_at(episode, first, last, component)
@@ -167,7 +142,8 @@ def _overdue(played: Played) -> Iterator[Fields]:
             away = " to ".join(f"{step:,}" for step in dict.fromkeys(steps))
             noun = "step" if steps[-1] == 1 else "steps"
             fields = {"first": first, "last": last, "component": component, "came": kept}
-            yield fields | {"away": f"{away} {noun}"}
+            never = "broken-promise" if episode.terminated else "overdue-promise"
+            yield never if kept is None else "late-promise", fields | {"away": f"{away} {noun}"}
 
 
 def _kept_at(episode: Episode, first: int, last: int, component: int) -> int | None:
@@ -191,9 +167,8 @@ def promised(episode: Episode) -> IntArray:
     if not explicit.size:
         return np.full(len(episode), -1)
     discounts = np.maximum(episode.time_axis.discounts[:-1], SMALLEST_DISCOUNT)
-    least = (
-        HALF * max(float((explicit / discounts).max()), float(episode.rewards.max())) * discounts
-    )
+    most = max(float((explicit / discounts).max()), float(episode.rewards.max()))
+    least = HALF * most * discounts
     best = explicit.argmax(axis=1)
     largest = explicit[np.arange(len(episode)), best]
     return np.where((largest > 0.0) & (largest >= least[best]), best, -1)

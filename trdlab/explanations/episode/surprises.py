@@ -1,17 +1,15 @@
 """Steps of an episode that turned out other than expected, and why."""
 
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
 from trdlab.arrays import FloatArray
 from trdlab.explanations.episode.played import EPISODES, Played
-from trdlab.explanations.rules import Claim, Fields
+from trdlab.explanations.rules import Claim, Fields, Found
 
-FOCUS = 1 / 3
-"""The share of a surprise that one component must account for, to be named as its reason."""
-NEARLY = 1 / 4
-"""The share of what moved from one step to another by which signs may be mixed there."""
+FOCUS = 1 / 3  # of a surprise: what one component must account for, to be named as its reason
+NEARLY = 1 / 4  # of what moved from one step to another: how far signs may be mixed there
 
 _TURNED = "{action} at {step:step} turned out {gap:number} {outcome:text} than expected"
 _ALIKE = "all together it expects about the same."
@@ -45,38 +43,24 @@ _SAYS = {
         f"{{down:when}}; {_ALIKE}"
     ),
 }
-"""Of each kind of turn its sentence; each is one rule."""
 
 
 def surprise(played: Played, row: int) -> Claim:
-    """Returns what is to say of a step that changed something.
-
-    Args:
-        played: the episode.
-        row: the place of the step in its revision.
-    """
+    """Returns what is to say of the step at a row of the revision, which changed something."""
     kind, fields = _turns(played)[row]
     return Claim(EPISODES.rules[kind], played, fields)
 
 
-# ---- what a step changed -----------------------------------------------------------------------
-
-
 @lru_cache(maxsize=8)
-def _turns(played: Played) -> tuple[tuple[str, Fields], ...]:
+def _turns(played: Played) -> tuple[Found, ...]:
     """Returns `[T′]`, of each step of the revision what kind of turn it was, and its numbers."""
     return tuple(_turn(played, row) for row in range(len(played.revision)))
 
 
-def _of_kind(kind: str, played: Played) -> list[Fields]:
-    return [fields for name, fields in _turns(played) if name == kind]
+EPISODES.kinds(_SAYS)(_turns)
 
 
-for _kind, _says in _SAYS.items():
-    EPISODES.rule(_says, kind=_kind)(partial(_of_kind, _kind))
-
-
-def _turn(played: Played, row: int) -> tuple[str, Fields]:
+def _turn(played: Played, row: int) -> Found:
     of = played.revision
     step, before, after = int(of.steps[row]), of.before[row], of.after[row]
     about: Fields = {"step": step, "action": played.action(step)}
@@ -94,23 +78,22 @@ def _turn(played: Played, row: int) -> tuple[str, Fields]:
         is_over = played.episode.terminated and of.last[row] == len(played.episode) - 1
         ending = "the episode ended" if is_over else "a life was lost"
         return "ended-early", about | {"ending": ending, "promised": float(before[1:].sum())}
-    peak = focus(directed)
-    if peak == 0:
-        expected = {"expected": float(before[0])}
-        if after[0] == 0.0:
-            return "no-reward", about | expected
-        return "other-reward", about | expected | {"reward": float(after[0])}
-    if peak is not None:
-        was, now = float(before[peak]), float(after[peak])
+    peak, speaks_for_it = int(directed.argmax()), np.maximum(directed, 0.0)
+    if not directed[peak] >= FOCUS * speaks_for_it.sum():
+        so_far = speaks_for_it.cumsum()
+        half = int((so_far >= so_far[-1] / 2.0).argmax())
+        return "spread-out", about | {"by": (half + 1) * played.episode.time_axis.width - 1}
+    was, now = float(before[peak]), float(after[peak])
+    if peak > 0:
         return "other-belief", about | {"component": peak, "was": was, "now": now}
-    so_far = np.maximum(directed, 0.0).cumsum()
-    half = int((so_far >= so_far[-1] / 2.0).argmax())
-    return "spread-out", about | {"by": (half + 1) * played.episode.time_axis.width - 1}
+    if now == 0.0:
+        return "no-reward", about | {"expected": was}
+    return "other-reward", about | {"expected": was, "reward": now}
 
 
 def _shift(
     about: Fields, before: FloatArray, after: FloatArray, up: int, down: int, moved: float
-) -> tuple[str, Fields]:
+) -> Found:
     """Returns what a step did that moved rewards, or costs, and left the total about the same."""
     slack = NEARLY * moved
     if before[up] >= -slack and after[down] >= -slack:
@@ -122,16 +105,6 @@ def _shift(
         return "exchanged", about | {"up": up, "gain": gain, "down": down, "loss": loss}
     kind = "put-off" if to > origin else "brought-forward"
     return kind, about | {"worth": worth, "origin": origin, "to": to}
-
-
-def focus(directed: FloatArray) -> int | None:
-    """Returns the component that changed most in a direction, None if many changed as much.
-
-    Args:
-        directed: `[N+1]`, the change; what is above 0 speaks for the outcome.
-    """
-    peak = int(directed.argmax())
-    return peak if directed[peak] >= FOCUS * np.maximum(directed, 0.0).sum() else None
 
 
 def moved_between(change: FloatArray) -> tuple[int, int, float]:

@@ -5,14 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from trdlab.explanations.moment.moment import CHOICES, Choice
-from trdlab.explanations.moment.steps import (
-    NEGLIGIBLE,
-    SHARE,
-    explicit_end,
-    largest,
-    undiscounted,
-)
-from trdlab.explanations.rules import Fields
+from trdlab.explanations.moment.steps import NEGLIGIBLE, SHARE, explicit_end, largest, undiscounted
+from trdlab.explanations.rules import Fields, Found
 
 
 def outcomes_of(choice: Choice) -> Sequence[dict[float, float]]:
@@ -82,22 +76,16 @@ def either_or(choice: Choice) -> Iterator[Fields]:
         yield {"action": choice.action, "reward": reward, "component": i, "chance": chance}
 
 
-@CHOICES.rule("With {action}, there is {chance:chance} that the episode ends {last_step:within}.")
-def likely_over(choice: Choice) -> Iterator[Fields]:
+@CHOICES.kinds(
+    {
+        "likely-over": (
+            "With {action}, there is {chance:chance} that the episode ends {last_step:within}."
+        ),
+        "surely-over": "With {action}, the episode ends {last_step:within}.",
+    }
+)
+def over(choice: Choice) -> Iterator[Found]:
     """The first component at whose beginning the episode has more likely ended than not."""
-    yield from (over for over in _over(choice) if over["chance"] < 1.0)
-
-
-@CHOICES.rule("With {action}, the episode ends {last_step:within}.")
-def surely_over(choice: Choice) -> Iterator[Fields]:
-    """It has ended for certain by the first component at which it has likely ended."""
-    yield from (over for over in _over(choice) if over["chance"] == 1.0)
-
-
-VARYING, LASTING = (give_or_take,), (likely_over, surely_over)
-
-
-def _over(choice: Choice) -> Iterator[Fields]:
     known = choice.moment.uncertainty
     if known is not None:
         survival = known.survival[choice.moment.index(choice.action)]
@@ -105,4 +93,5 @@ def _over(choice: Choice) -> Iterator[Fields]:
         if below.size:
             last_step = choice.time_axis.start(int(below[0])) - 1
             chance = 1.0 - float(survival[below[0]])
-            yield {"action": choice.action, "last_step": last_step, "chance": chance}
+            fields = {"action": choice.action, "last_step": last_step, "chance": chance}
+            yield "likely-over" if chance < 1.0 else "surely-over", fields

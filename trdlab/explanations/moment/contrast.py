@@ -12,13 +12,12 @@ from trdlab.explanations.moment.leads import (
     crossings,
     is_by_discount,
     is_immediate,
-    is_tied,
     leads_of,
     sums,
 )
 from trdlab.explanations.moment.moment import CHOICES, Choice
 from trdlab.explanations.moment.steps import doubtful
-from trdlab.explanations.rules import Claim, Fields, every, first
+from trdlab.explanations.rules import Claim, Fields, Found, every, first
 
 _DECIDES = 0.8  # of all that differs: what lies at one step decides
 _MOST_DOUBT = 0.5  # of a difference, to tell what comes when
@@ -32,145 +31,123 @@ def contrast(choice: Choice) -> list[Claim]:
     then totals and values, and the few steps that are enough to prefer the better action. Where
     more than half of the difference is not to be trusted, that is told in place of what comes when.
     """
-    if nothing := first(choice, nothing_at_all, nothing_on_average):
-        return nothing
-    worth = every(choice, equal_totals, different_totals, no_total)
-    worth += first(choice, better_by_discount, better_against_total, better, equal_values)
-    if alike := first(choice, same_rewards, same_components):
-        return alike + worth
+    if expected := every(choice, *nothing):
+        return expected
+    worth = every(choice, *totals) + first(choice, *values)
+    if same_all_along := every(choice, *alike):
+        return same_all_along + worth
     if doubt := every(choice, untested_difference):
         return worth[-1:] + doubt + worth[:-1]
-    ahead = first(choice, more_immediate, costs_less, pays_more)
-    turns = every(choice, overtakes, makes_up)
-    decided = every(choice, decided_at)
-    told = decided if decided and not turns else ahead + turns
-    return (
-        told + worth + ([] if told is decided else decided) + every(choice, never_behind, reasons)
-    )
+    passing, decided = every(choice, *turns), every(choice, decided_at)
+    rest = every(choice, never_behind, reasons)
+    if decided and not passing:
+        return decided + worth + rest
+    return first(choice, *leads) + passing + worth + decided + rest
 
 
 def in_brief(choice: Choice) -> list[Claim]:
     """Returns who is ahead and why, and what the discount has to do with it."""
     told = contrast(choice)
-    kinds = [claim.kind for claim in told]
     brief = told[:1] + [c for c in told[1:] if c.kind in ("overtakes", "makes-up")]
-    if {"better-by-discount", "better-against-total"} & set(kinds):
+    if any(claim.kind in _BY_DISCOUNT[1:] for claim in told):
         return brief + [c for c in told if c.kind in _BY_DISCOUNT]
     return brief + [c for c in told if c.kind in ("better", "equal-values") and c not in brief]
 
 
 _BY_DISCOUNT = ("different-totals", "better-by-discount", "better-against-total")
 
-# ---- what is paid in total, and what that is worth now -------------------------------------------
 
-
-@CHOICES.rule("Both bring {total:number} in total{averages:averages}{ties:ties}.")
-def equal_totals(choice: Choice) -> Iterator[Fields]:
-    if choice.foil is not None and not is_by_discount(choice):
-        a, b = (choice.moment.total(name) for name in (choice.action, choice.foil))
+@CHOICES.kinds(
+    {
+        "equal-totals": "Both bring {total:number} in total{averages:averages}{ties:ties}.",
+        "different-totals": (
+            "In total {more} brings {more_total:number} and {less} "
+            "{less_total:number}{averages:averages}{ties:ties}."
+        ),
+        "no-total": "The rewards after {action} may never end, so there is no total.",
+    }
+)
+def totals(choice: Choice) -> Iterator[Found]:
+    """What is paid in total."""
+    is_tied = bool(choice.moment.tied or choice.moment.tied_later)  # totals depend on it
+    notes = {"averages": are_sure(choice), "ties": is_tied}
+    for action, other in choice.orders:
+        a, b = choice.moment.total(action), choice.moment.total(other)
         if same(a, b):
-            yield {"total": a, "averages": are_sure(choice), "ties": is_tied(choice)}
+            if action == choice.action and not is_by_discount(choice):
+                yield "equal-totals", {"total": a} | notes
+        elif a > b:
+            paid = {"more": action, "less": other, "more_total": a, "less_total": b}
+            yield "different-totals", paid | notes
+        if choice.moment.totals is not None and np.isnan(a):
+            yield "no-total", {"action": action}
 
 
-@CHOICES.rule(
-    "In total {more} brings {more_total:number} and {less} {less_total:number}"
-    "{averages:averages}{ties:ties}."
+@CHOICES.kinds(
+    {
+        "better-by-discount": (
+            "Both pay {total:number} in total{average:average}, but each step of waiting makes a "
+            "reward count {loss:percent} less: {better} is worth {better_value:number}, {worse} "
+            "{worse_value:number}."
+        ),
+        "better-against-total": (
+            "But each step of waiting makes a reward count {loss:percent} less: {better} is worth "
+            "{better_value:number}, {worse} {worse_value:number}."
+        ),
+        "better": (
+            "All steps counted, {better} is worth {better_value:number} and {worse} is worth "
+            "{worse_value:number} (γ = {gamma:given})."
+        ),
+        "equal-values": "{action} and {foil} are worth the same: {value:number}.",
+    }
 )
-def different_totals(choice: Choice) -> Iterator[Fields]:
-    for more, less in choice.orders:
-        a, b = choice.moment.total(more), choice.moment.total(less)
-        if a > b and not same(a, b):
-            yield {
-                "more": more,
-                "less": less,
-                "more_total": a,
-                "less_total": b,
-                "averages": are_sure(choice),
-                "ties": is_tied(choice),
-            }
-
-
-@CHOICES.rule("The rewards after {action} may never end, so there is no total.")
-def no_total(choice: Choice) -> Iterator[Fields]:
-    for action, _ in choice.orders:
-        if choice.moment.totals is not None and np.isnan(choice.moment.total(action)):
-            yield {"action": action}
-
-
-@CHOICES.rule(
-    "Both pay {total:number} in total{average:average}, but each step of waiting makes a reward "
-    "count {loss:percent} less: {better} is worth {better_value:number}, {worse} "
-    "{worse_value:number}."
-)
-def better_by_discount(choice: Choice) -> Iterator[Fields]:
-    if is_by_discount(choice):
-        total = choice.moment.total(choice.action)
-        yield from better_of(choice, total=total, average=are_sure(choice))
-
-
-@CHOICES.rule(
-    "But each step of waiting makes a reward count {loss:percent} less: {better} is worth "
-    "{better_value:number}, {worse} {worse_value:number}."
-)
-def better_against_total(choice: Choice) -> Iterator[Fields]:
+def values(choice: Choice) -> Iterator[Found]:
+    """What the totals are worth now."""
     for fields in better_of(choice):
         a, b = (choice.moment.total(fields[name]) for name in ("better", "worse"))
+        if is_by_discount(choice):
+            total = choice.moment.total(choice.action)
+            yield "better-by-discount", fields | {"total": total, "average": are_sure(choice)}
         if a < b and not same(a, b):
-            yield fields
-
-
-@CHOICES.rule(
-    "All steps counted, {better} is worth {better_value:number} and {worse} is worth "
-    "{worse_value:number} (γ = {gamma:given})."
-)
-def better(choice: Choice) -> Iterator[Fields]:
-    yield from better_of(choice)
-
-
-@CHOICES.rule("{action} and {foil} are worth the same: {value:number}.")
-def equal_values(choice: Choice) -> Iterator[Fields]:
+            yield "better-against-total", fields
+        yield "better", fields
     for action, foil in choice.orders[:1]:
         a, b = choice.moment.q_value(action), choice.moment.q_value(foil)
         if same(a, b):
-            yield {"action": action, "foil": foil, "value": a}
+            yield "equal-values", {"action": action, "foil": foil, "value": a}
 
 
-@CHOICES.rule("Nothing is expected of any action here.")
-def nothing_at_all(choice: Choice) -> Iterator[Fields]:
-    moment = choice.moment
-    is_chancy = moment.uncertainty is not None and moment.uncertainty.return_deviation.any()
-    if not moment.decomposition.components.any() and not is_chancy:
-        yield {}
+@CHOICES.kinds(
+    {
+        "nothing-at-all": "Nothing is expected of any action here.",
+        "nothing-on-average": (
+            "On average no action pays anything here, but single episodes differ."
+        ),
+    }
+)
+def nothing(choice: Choice) -> Iterator[Found]:
+    if not choice.moment.decomposition.components.any():
+        known = choice.moment.uncertainty
+        is_chancy = known is not None and known.return_deviation.any()
+        yield "nothing-on-average" if is_chancy else "nothing-at-all", {}
 
 
-@CHOICES.rule("On average no action pays anything here, but single episodes differ.")
-def nothing_on_average(choice: Choice) -> Iterator[Fields]:
-    if not choice.moment.decomposition.components.any() and not any(nothing_at_all(choice)):
-        yield {}
-
-
-# ---- who is ahead, and when ----------------------------------------------------------------------
-
-
-@CHOICES.rule("{action} and {foil} lead to the same rewards at the same times{averages:averages}.")
-def same_rewards(choice: Choice) -> Iterator[Fields]:
-    """All that comes is told step by step."""
-    for fields in _alike(choice):
-        row = choice.moment.components(fields["action"])
-        if choice.time_axis.width == 1 and row[-1] == 0.0:
-            yield fields
-
-
-@CHOICES.rule("Nothing in these numbers tells {action} and {foil} apart.")
-def same_components(choice: Choice) -> Iterator[Fields]:
-    if not any(same_rewards(choice)):
-        yield from _alike(choice)
-
-
-def _alike(choice: Choice) -> Iterator[Fields]:
+@CHOICES.kinds(
+    {
+        "same-rewards": (
+            "{action} and {foil} lead to the same rewards at the same times{averages:averages}."
+        ),
+        "same-components": "Nothing in these numbers tells {action} and {foil} apart.",
+    }
+)
+def alike(choice: Choice) -> Iterator[Found]:
+    """Rewards are the same where all that comes is told step by step."""
     for action, foil in choice.orders[:1]:
         if not choice.moment.difference(action, foil).any():
-            yield {"action": action, "foil": foil, "averages": are_sure(choice)}
+            residual = choice.moment.components(action)[-1]
+            is_all_told = choice.time_axis.width == 1 and residual == 0.0
+            fields = {"action": action, "foil": foil, "averages": are_sure(choice)}
+            yield "same-rewards" if is_all_told else "same-components", fields
 
 
 @CHOICES.rule(
@@ -214,66 +191,55 @@ def decided_at(choice: Choice) -> Iterator[Fields]:
             }
 
 
-@CHOICES.rule(
-    "{leader} gives more immediate rewards: {leader_sum:number} {last_step:within}, where {other} "
-    "{other_sum:gives}{averages:averages}."
+@CHOICES.kinds(
+    {
+        "more-immediate": (
+            "{leader} gives more immediate rewards: {leader_sum:number} {last_step:within}, where "
+            "{other} {other_sum:gives}{averages:averages}."
+        ),
+        "costs-less": (
+            "{leader} costs less: {leader_cost:size} {last_step:within}, where {other} costs "
+            "{other_cost:number}{averages:averages}."
+        ),
+        "pays-more": (
+            "{last_step:within} {leader} {leader_sum:gains} and {other} "
+            "{other_sum:gains}{averages:averages}."
+        ),
+    }
 )
-def more_immediate(choice: Choice) -> Iterator[Fields]:
-    """Rewards come soon, and no cost comes with them."""
-    for lead in leads_of(choice):
-        if is_immediate(choice, lead):
-            yield lead
-
-
-@CHOICES.rule(
-    "{leader} costs less: {leader_cost:size} {last_step:within}, where {other} costs "
-    "{other_cost:number}{averages:averages}."
-)
-def costs_less(choice: Choice) -> Iterator[Fields]:
-    """There are nothing but costs; the sums are what it costs."""
+def leads(choice: Choice) -> Iterator[Found]:
+    """Who leads, be it by rewards that come soon, by nothing but lower costs, or otherwise."""
     for lead in leads_of(choice):
         if are_costs(choice, lead):
-            leader, other = -lead["leader_sum"], -lead["other_sum"]
-            yield lead | {"leader_cost": abs(leader), "other_cost": other}
+            costs = {"leader_cost": abs(lead["leader_sum"]), "other_cost": -lead["other_sum"]}
+            yield "costs-less", lead | costs
+        else:
+            yield "more-immediate" if is_immediate(choice, lead) else "pays-more", lead
 
 
-@CHOICES.rule(
-    "{last_step:within} {leader} {leader_sum:gains} and {other} {other_sum:gains}"
-    "{averages:averages}."
+@CHOICES.kinds(
+    {
+        "overtakes": (
+            "After {count:first} {leader} has overtaken {other}: added up, it {leader_sum:gains} "
+            "and {other} {other_sum:gains}{averages:averages}."
+        ),
+        "makes-up": (
+            "But what comes {component:when} decides: {leader} pays {more:number} more then than "
+            "{other}{averages:averages}."
+        ),
+    }
 )
-def pays_more(choice: Choice) -> Iterator[Fields]:
-    """Rewards do not come soon, or costs come with them."""
-    for lead in leads_of(choice):
-        if not is_immediate(choice, lead) and not are_costs(choice, lead):
-            yield lead
-
-
-@CHOICES.rule(
-    "After {count:first} {leader} has overtaken {other}: added up, it {leader_sum:gains} and "
-    "{other} {other_sum:gains}{averages:averages}."
-)
-def overtakes(choice: Choice) -> Iterator[Fields]:
+def turns(choice: Choice) -> Iterator[Found]:
+    """Where the running total of one action passes the other's, at a step or at the residual."""
     for leader, other, i in crossings(choice):
         if i < choice.time_axis.horizon:
             count = (i + 1) * choice.time_axis.width
-            yield sums(choice, leader, other, i + 1) | {"component": i, "count": count}
-
-
-@CHOICES.rule(
-    "But what comes {component:when} decides: {leader} pays {more:number} more then than {other}"
-    "{averages:averages}."
-)
-def makes_up(choice: Choice) -> Iterator[Fields]:
-    """The running total of one action passes the other's at the residual."""
-    for leader, other, i in crossings(choice):
-        if i == choice.time_axis.horizon:
-            yield {
-                "component": i,
-                "leader": leader,
-                "other": other,
-                "more": float(choice.moment.difference(leader, other)[i]),
-                "averages": are_sure(choice, slice(i, i + 1)),
-            }
+            fields = sums(choice, leader, other, i + 1) | {"component": i, "count": count}
+            yield "overtakes", fields
+        else:
+            more = float(choice.moment.difference(leader, other)[i])
+            fields = {"component": i, "leader": leader, "other": other, "more": more}
+            yield "makes-up", fields | {"averages": are_sure(choice, slice(i, i + 1))}
 
 
 @CHOICES.rule(
@@ -287,9 +253,6 @@ def never_behind(choice: Choice) -> Iterator[Fields]:
         is_ahead = bool((lead >= 0).all()) and (lead[:-1] > 0).any() and lead[-1] > 0
         if axis.width == 1 and is_ahead:
             yield {"leader": leader, "other": other, "count": axis.horizon}
-
-
-# ---- what is enough to prefer one ----------------------------------------------------------------
 
 
 def _is_sufficient(

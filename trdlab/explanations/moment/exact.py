@@ -16,8 +16,7 @@ _ROUNDING = 1e-9  # of a total: sums of many steps that differ by less are the s
 GAMMA_RANGE = (0.01, 0.99)
 MAX_SPREAD = 10_000_000  # states times steps, beyond which spread is not worked out
 MAX_WHAT_IF_STATES = 2_000  # each quantity takes a hundred solves
-REWARD_RANGE = 10.0
-"""How many times its present value a source of reward is varied up to, from zero on."""
+REWARD_RANGE = 10.0  # times its present value: up to that a source of reward is varied
 
 
 def tabular_moment(
@@ -33,6 +32,8 @@ def tabular_moment(
     """
     solution, mdp = table.solution, table.mdp
     totals = undiscounted_totals(mdp, solution.policy)  # [S, A]
+    size = np.abs(table.decomposition.components[state]).sum(axis=-1)  # [A]
+    cancel = np.abs(totals[state]) <= RELATIVE_ZERO * size  # rewards and costs, but for rounding
     ambiguous = table.ambiguous | _totals_differ(totals, solution.tied)
     here = bool(ambiguous[state])
     tied = zip(action_names, solution.tied[state] & here, strict=True)
@@ -41,7 +42,7 @@ def tabular_moment(
         action_names=tuple(action_names),
         future=table.future,
         policy=solution.policy[state],
-        totals=_totals(table, totals[state], state),
+        totals=np.where(cancel, 0.0, totals[state]),
         stays=_stays(mdp, state),
         is_over=bool(mdp.terminal_states[state]),
         tied=tuple(name for name, is_tied in tied if is_tied),
@@ -49,12 +50,6 @@ def tabular_moment(
         what_ifs=tuple(what_ifs),
         uncertainty=_uncertainty(table, state),
     )
-
-
-def _totals(table: ExactTable, totals: FloatArray, state: int) -> FloatArray:
-    """Returns undiscounted totals `[A]`, 0 where rewards and costs cancel but for rounding."""
-    size = np.abs(table.decomposition.components[state]).sum(axis=-1)  # [A]
-    return np.where(np.abs(totals) <= RELATIVE_ZERO * size, 0.0, totals)
 
 
 def _totals_differ(totals: FloatArray, tied: BoolArray) -> BoolArray:
@@ -91,13 +86,12 @@ def _uncertainty(table: ExactTable, state: int) -> Uncertainty | None:
         return None
     known = spread(table)
     steps = axis.num_steps if axis.width == 1 else 0
+    paid = (outcomes(mdp, policy, state, action, steps) for action in range(mdp.num_actions))
     return Uncertainty(
         deviation=known.deviation[state],
         return_deviation=np.sqrt(known.return_variance[state]),
         survival=known.survival[state],
-        outcomes=tuple(
-            tuple(outcomes(mdp, policy, state, action, steps)) for action in range(mdp.num_actions)
-        ),
+        outcomes=tuple(map(tuple, paid)),
     )
 
 
@@ -123,25 +117,14 @@ def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
 
 
 def exact_moment(world: Gridworld | TabularWorld, table: ExactTable, state: int) -> Moment:
-    """Returns what the table of a model expects in one state, with what can be varied there.
-
-    Args:
-        world: the model in words.
-        table: its exact decomposition.
-        state: the index of the state.
-    """
+    """Returns what the table of a model expects in one state, with what can be varied there."""
     if isinstance(world, Gridworld):
         return gridworld_moment(world, table, state)
     return tabular_moment(table, state, world.action_names, gamma_what_ifs(table, state))
 
 
 def gamma_what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
-    """Returns γ as a quantity that can be varied, where few enough states can follow.
-
-    Args:
-        table: the exact decomposition.
-        state: the index of the state.
-    """
+    """Returns γ as a quantity that can be varied, where few enough states can follow."""
     from trdlab.tabular.models import part_after  # gridworlds do without it
 
     gamma, part = table.time_axis.gamma, part_after(table.mdp, state)
@@ -151,13 +134,7 @@ def gamma_what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
 
 
 def gamma_what_if(mdp: MDP, gamma: float, state: int) -> WhatIf:
-    """Returns γ as a quantity that can be varied, the optimal policy solved for again each time.
-
-    Args:
-        mdp: the model.
-        gamma: its present discount factor.
-        state: whose Q-values are asked for.
-    """
+    """Returns γ as a quantity that can be varied, the optimal policy solved for again each time."""
     low, high = min(GAMMA_RANGE[0], gamma), max(GAMMA_RANGE[1], gamma)
     return WhatIf("γ", gamma, low, high, _Resolved(state, lambda value: (mdp, value)))
 

@@ -1,11 +1,11 @@
 """Forecast: what one action is expected to pay, and when."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from trdlab.arrays import RELATIVE_ZERO, FloatArray
-from trdlab.explanations.moment.chances import LASTING, VARYING, either_or, outcomes_of, put_at
+from trdlab.explanations.moment.chances import either_or, give_or_take, outcomes_of, over, put_at
 from trdlab.explanations.moment.moment import CHOICES, Choice
 from trdlab.explanations.moment.peaks import regular, rhythm, steady
 from trdlab.explanations.moment.steps import (
@@ -13,15 +13,12 @@ from trdlab.explanations.moment.steps import (
     explicit_end,
     largest,
     least,
-    speaks_of_all,
     stands_out,
     undiscounted,
 )
-from trdlab.explanations.rules import Claim, Fields, every, first
+from trdlab.explanations.rules import Claim, Fields, Found, every, first
 
-_MATTERS = 0.5
-"""An error is told that is at least this share of what is expected."""
-
+_MATTERS = 0.5  # of what is expected: an error is told that is at least this share
 _TOO_LITTLE = 0.05  # of an action's value, to tell that it lies beyond
 
 
@@ -35,13 +32,12 @@ def forecast(choice: Choice) -> list[Claim]:
     end = explicit_end(choice.moment, choice.action)
     if doubtful(choice.moment, choice.action).all():
         return []
-    chances = every(choice, *VARYING, *LASTING)
+    chances = every(choice, give_or_take, *over)
     if not choice.moment.components(choice.action)[:end].any():
-        nothing = first(choice, earns_nothing, zero_on_average, all_beyond, nothing_before)
-        return nothing + chances
+        return first(choice, *silence) + chances
     when = first(choice, steady, next_to_nothing)
     if not when:
-        when = every(choice, *FIRSTS)
+        when = every(choice, *firsts)
         named = {claim.component for claim in when}
         when += [c for c in every(choice, either_or) if c.component not in named]
         when += every(choice, put_at) + regular(choice, named)
@@ -50,32 +46,30 @@ def forecast(choice: Choice) -> list[Claim]:
     return when + every(choice, off_by, share_beyond) + centre + chances
 
 
-@CHOICES.rule("Nothing is expected of {action}, at any step.")
-def earns_nothing(choice: Choice) -> Iterator[Fields]:
-    if _expects_nothing(choice) and not _is_chancy(choice):
-        yield {"action": choice.action}
-
-
-@CHOICES.rule("{action} pays nothing on average at any step, but single episodes differ.")
-def zero_on_average(choice: Choice) -> Iterator[Fields]:
-    if _expects_nothing(choice) and _is_chancy(choice):
-        yield {"action": choice.action}
-
-
-@CHOICES.rule("{action} pays nothing {last_step:within}; what comes later is worth {value:number}.")
-def all_beyond(choice: Choice) -> Iterator[Fields]:
-    row, horizon = _row(choice), choice.time_axis.horizon
-    is_told = horizon > 0 and speaks_of_all(choice.moment, choice.action)
-    if is_told and not row[:-1].any() and row[-1] != 0.0:
-        last_step = choice.time_axis.num_steps - 1
-        yield {"action": choice.action, "last_step": last_step, "value": float(row[-1])}
-
-
-@CHOICES.rule("Nothing is expected of {action} {last_step:within}.")
-def nothing_before(choice: Choice) -> Iterator[Fields]:
-    end = explicit_end(choice.moment, choice.action)
-    if end > 0 and not _row(choice)[:end].any():
-        yield {"action": choice.action, "last_step": end * choice.time_axis.width - 1}
+@CHOICES.kinds(
+    {
+        "earns-nothing": "Nothing is expected of {action}, at any step.",
+        "zero-on-average": (
+            "{action} pays nothing on average at any step, but single episodes differ."
+        ),
+        "all-beyond": (
+            "{action} pays nothing {last_step:within}; what comes later is worth {value:number}."
+        ),
+        "nothing-before": "Nothing is expected of {action} {last_step:within}.",
+    }
+)
+def silence(choice: Choice) -> Iterator[Found]:
+    moment, action, axis, row = choice.moment, choice.action, choice.time_axis, _row(choice)
+    is_chancy = moment.uncertainty is not None and not moment.is_sure(action)
+    if not doubtful(moment, action).any() and not row[:-1].any():
+        if row[-1] == 0.0:
+            yield "zero-on-average" if is_chancy else "earns-nothing", {"action": action}
+        elif axis.horizon > 0:
+            fields = {"action": action, "last_step": axis.num_steps - 1, "value": float(row[-1])}
+            yield "all-beyond", fields
+    end = explicit_end(moment, action)
+    if end > 0 and not row[:end].any():
+        yield "nothing-before", {"action": action, "last_step": end * axis.width - 1}
 
 
 @CHOICES.rule("Hardly anything is expected of {action} {last_step:within}.")
@@ -86,71 +80,85 @@ def next_to_nothing(choice: Choice) -> Iterator[Fields]:
         yield {"action": choice.action, "last_step": len(row) * choice.time_axis.width - 1}
 
 
-# ---- the first reward, and the first cost ------------------------------------------------------
-
-
-@CHOICES.rule(
-    "With {action}, the first {effect:text} comes {component:when}: it is {worth:worth}"
-    "{amount:number}."
+@CHOICES.kinds(
+    {
+        "first-reward": (
+            "With {action}, the first {effect:text} comes {component:when}: it is "
+            "{worth:worth}{amount:number}."
+        ),
+        "first-chance": (
+            "With {action}, a {effect:text} of {amount:number} can come "
+            "{component:when}{earliest:text}; the chance that it comes then is {chance:percent}."
+        ),
+        "first-of-several": (
+            "With {action}, a {effect:text} can come {component:when}{earliest:text}; the chance "
+            "that it comes then is {chance:percent}."
+        ),
+        "first-expected": (
+            "With {action}, the first {effect:text} to expect comes {component:when}: "
+            "{worth:worth}{amount:number} on average."
+        ),
+    }
 )
-def first_reward(choice: Choice) -> Iterator[Fields]:
-    yield from (told for told in _firsts(choice) if told["is_sure"])
+def firsts(choice: Choice) -> Iterator[Found]:
+    """Yields the first reward and the first cost that stand out, the earlier one first.
 
-
-@CHOICES.rule(
-    "With {action}, a {effect:text} of {amount:number} can come {component:when}{earliest:text}; "
-    "the chance that it comes then is {chance:percent}."
-)
-def first_chance(choice: Choice) -> Iterator[Fields]:
-    """That step pays, or costs, one amount or none."""
-    for told in _firsts(choice):
-        if not told["is_sure"] and len(told["amounts"]) == 1:
-            yield told | {"amount": told["amounts"][0]}
-
-
-@CHOICES.rule(
-    "With {action}, a {effect:text} can come {component:when}{earliest:text}; the chance that it "
-    "comes then is {chance:percent}."
-)
-def first_of_several(choice: Choice) -> Iterator[Fields]:
-    """That step pays, or costs, different amounts."""
-    yield from (told for told in _firsts(choice) if len(told["amounts"]) > 1)
-
-
-@CHOICES.rule(
-    "With {action}, the first {effect:text} to expect comes {component:when}: {worth:worth}"
-    "{amount:number} on average."
-)
-def first_expected(choice: Choice) -> Iterator[Fields]:
-    """It is not known what that step can pay, but for its mean."""
-    for told in _firsts(choice):
-        if not told["is_sure"] and not told["amounts"]:
-            yield told
-
-
-FIRSTS = (first_reward, first_chance, first_of_several, first_expected)
-
-
-# ---- how much lies where -----------------------------------------------------------------------
+    Where it is known what each step can pay, that is the first step that can pay so; the mean of an
+    earlier one may have another sign. One that smaller ones precede is called clear.
+    """
+    moment, axis, action = choice.moment, choice.time_axis, choice.action
+    row, paid = undiscounted(moment, action), outcomes_of(choice)
+    found = []
+    for sign, effect in ((1.0, "reward"), (-1.0, "cost")):
+        part = np.maximum(sign * row, 0.0)  # [K], how much of it is expected at each step
+        if paid:
+            part = np.array([sum(p * max(sign * r, 0.0) for r, p in step.items()) for step in paid])
+        notable = np.flatnonzero((part > 0.0) & (part >= least(moment, action)))
+        if notable.size:
+            i = int(notable[0])
+            effect = "clear " * bool(part[:i].any()) + effect
+            step = paid[i] if paid else {}
+            chances = {abs(r): p for r, p in step.items() if sign * r > 0.0}
+            found.append((i, effect, float(part[i]), chances))
+    for i, effect, mean, chances in sorted(found):
+        chance = min(sum(chances.values()), 1.0)
+        amounts, is_one = tuple(sorted(chances)), len(chances) == 1
+        one_for_sure = is_one and chance >= 1.0 - RELATIVE_ZERO
+        is_sure = one_for_sure if paid else moment.is_sure(action, slice(i, i + 1))
+        several = "first-of-several" if amounts else "first-expected"
+        kind = "first-reward" if is_sure else "first-chance" if is_one else several
+        fields = {
+            "action": action,
+            "effect": effect,
+            "component": i,
+            "earliest": " at the earliest" if i else "",
+            "worth": axis.width > 1,
+            "amount": amounts[0] if kind == "first-chance" else mean,
+            "amounts": amounts,
+            "chance": chance,
+            "is_sure": is_sure,
+        }
+        yield kind, fields
 
 
 @CHOICES.rule("Forecasts of what comes {component:when} are off by about {error:number}.")
 def off_by(choice: Choice) -> Iterator[Fields]:
     """The root mean square of what forecasts of the largest component are off by, if it matters."""
     errors, row = choice.moment.error_of(choice.action), _row(choice)
-    if errors is None or choice.moment.is_exact:
+    nothing = not undiscounted(choice.moment, choice.action).any()
+    if nothing or errors is None or choice.moment.is_exact:
         return
-    if undiscounted(choice.moment, choice.action).any():
-        i = largest(choice.moment, choice.action)
-        if errors[i] >= _MATTERS * abs(row[i]):  # not so if it is NaN
-            yield {"action": choice.action, "component": i, "error": float(errors[i])}
+    i = largest(choice.moment, choice.action)
+    if errors[i] >= _MATTERS * abs(row[i]):  # not so if it is NaN
+        yield {"action": choice.action, "component": i, "error": float(errors[i])}
 
 
 @CHOICES.rule("{share:percent} of what {action} is worth comes {component:when}.")
 def share_beyond(choice: Choice) -> Iterator[Fields]:
     """The share of the residual; all components have one sign."""
     row, horizon = _row(choice), choice.time_axis.horizon
-    if horizon > 0 and one_sign(row) and speaks_of_all(choice.moment, choice.action):
+    is_doubtful = doubtful(choice.moment, choice.action).any()
+    if horizon > 0 and one_sign(row) and not is_doubtful:
         share = float(row[-1] / row.sum())
         if _TOO_LITTLE <= share < 1.0:
             yield {"share": share, "action": choice.action, "component": horizon}
@@ -178,56 +186,5 @@ def one_sign(row: FloatArray) -> bool:
     return bool(row.any() and ((row >= 0.0).all() or (row <= 0.0).all()))
 
 
-# ---- the numbers -------------------------------------------------------------------------------
-
-
 def _row(choice: Choice) -> FloatArray:
     return choice.moment.components(choice.action)
-
-
-def _expects_nothing(choice: Choice) -> bool:
-    return not _row(choice).any() and speaks_of_all(choice.moment, choice.action)
-
-
-def _is_chancy(choice: Choice) -> bool:
-    return choice.moment.uncertainty is not None and not choice.moment.is_sure(choice.action)
-
-
-def _firsts(choice: Choice) -> Iterator[Fields]:
-    """Yields the first reward and the first cost that stand out, the earlier one first.
-
-    Where it is known what each step can pay, that is the first step that can pay so; the mean of an
-    earlier one may have another sign. One that smaller ones precede is called clear.
-    """
-    moment, axis, action = choice.moment, choice.time_axis, choice.action
-    row, paid = undiscounted(moment, action), outcomes_of(choice)
-    found = []
-    for sign, effect in ((1.0, "reward"), (-1.0, "cost")):
-        part = np.maximum(sign * row, 0.0)  # [K], how much of it is expected at each step
-        if paid:
-            part = np.array([sum(p * max(sign * r, 0.0) for r, p in step.items()) for step in paid])
-        notable = np.flatnonzero((part > 0.0) & (part >= least(moment, action)))
-        if notable.size:
-            i = int(notable[0])
-            effect = "clear " * bool(part[:i].any()) + effect
-            found.append((i, effect, float(part[i]), _chances(paid, i, sign)))
-    for i, effect, mean, chances in sorted(found):
-        chance = min(sum(chances.values()), 1.0)
-        one_for_sure = len(chances) == 1 and chance >= 1.0 - RELATIVE_ZERO
-        yield {
-            "action": action,
-            "effect": effect,
-            "component": i,
-            "earliest": " at the earliest" if i else "",
-            "worth": axis.width > 1,
-            "amount": mean,
-            "amounts": tuple(sorted(chances)),
-            "chance": chance,
-            "is_sure": one_for_sure if paid else moment.is_sure(action, slice(i, i + 1)),
-        }
-
-
-def _chances(paid: Sequence[dict[float, float]], i: int, sign: float) -> dict[float, float]:
-    """Returns the amounts of one sign that a step can pay, and the chance of each."""
-    step = paid[i] if paid else {}
-    return {abs(r): p for r, p in step.items() if sign * r > 0.0}

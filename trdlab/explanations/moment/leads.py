@@ -10,22 +10,20 @@ from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.steps import NEGLIGIBLE, SHARE, least, stands_out
 from trdlab.explanations.rules import Fields
 
-NOISE = 0.1
-"""A lead of what was learned may be noise up to this share of the largest one."""
-
+NOISE = 0.1  # of the largest lead: up to this one of what was learned may be noise
 _SEEN = 1e-3  # of a sum: a cost that changes it as it is printed
 _SOON = 4, 0.2  # immediate are so many steps, or such a share of the explicit ones
 _MOST_CROSSINGS = 2  # of more only the last is told
 
 
-def better_of(choice: Choice, **also: object) -> Iterator[Fields]:
+def better_of(choice: Choice) -> Iterator[Fields]:
     """Yields which action has the larger Q-value, if one has."""
     gamma = choice.time_axis.gamma
     for better, worse in choice.orders:
         a, b = choice.moment.q_value(better), choice.moment.q_value(worse)
         if a > b and not same(a, b):
             names = {"better": better, "worse": worse, "better_value": a, "worse_value": b}
-            yield names | {"gamma": gamma, "loss": 1.0 - gamma} | also
+            yield names | {"gamma": gamma, "loss": 1.0 - gamma}
 
 
 def is_by_discount(choice: Choice) -> bool:
@@ -38,11 +36,6 @@ def are_sure(choice: Choice, components: slice = slice(None)) -> bool:
     """Returns whether chance has no part in what both actions pay, as far as known."""
     names = (name for name, _ in choice.orders)
     return all(choice.moment.is_sure(name, components) for name in names)
-
-
-def is_tied(choice: Choice) -> bool:
-    """Returns whether totals and times depend on which of tied actions is taken."""
-    return bool(choice.moment.tied or choice.moment.tied_later)
 
 
 def sums(choice: Choice, leader: str, other: str, count: int) -> Fields:
@@ -64,7 +57,8 @@ def leads_of(choice: Choice) -> Iterator[Fields]:
     """
     axis, soon = choice.time_axis, _soon(choice)
     for leader, other in choice.orders:
-        lead = _clear(choice.moment, leader, other)  # [N]
+        lead = choice.moment.lead(leader, other)[:-1]  # [N]
+        lead[np.abs(lead) < _least_lead(choice.moment, leader, other)] = 0.0
         places = np.flatnonzero(lead)
         if not places.size or lead[places[0]] < 0:
             continue
@@ -89,26 +83,17 @@ def _count(choice: Choice, lead: Fields) -> int:
 
 def is_immediate(choice: Choice, lead: Fields) -> bool:
     """Returns whether a lead is one of rewards that come soon, with no cost among them."""
-    return (
-        _count(choice, lead) <= _soon(choice)
-        and lead["other_sum"] >= 0.0
-        and not are_costs(choice, lead)
-        and not has_costs(choice, lead)
-    )
+    count, names = _count(choice, lead), (lead["leader"], lead["other"])
+    rows = np.stack([choice.moment.components(name)[:count] for name in names])
+    # costs count that change the sums as they are printed
+    is_seen = choice.moment.is_exact and (rows < -_SEEN * abs(lead["leader_sum"])).any()
+    has_costs = is_seen or (_notable(choice, lead) < 0.0).any()
+    return bool(count <= _soon(choice) and lead["other_sum"] >= 0.0 and not has_costs)
 
 
 def are_costs(choice: Choice, lead: Fields) -> bool:
     """Returns whether nothing but costs stands out up to a lead."""
-    notable = _notable(choice, lead)
-    return bool(lead["leader_sum"] <= 0.0 and not (notable > 0.0).any())
-
-
-def has_costs(choice: Choice, lead: Fields) -> bool:
-    """Returns whether costs change the sums up to a lead, as they are printed."""
-    count, names = _count(choice, lead), (lead["leader"], lead["other"])
-    rows = np.stack([choice.moment.components(name)[:count] for name in names])
-    seen = choice.moment.is_exact and (rows < -_SEEN * abs(lead["leader_sum"])).any()
-    return bool(seen or (_notable(choice, lead) < 0.0).any())
+    return bool(lead["leader_sum"] <= 0.0 and not (_notable(choice, lead) > 0.0).any())
 
 
 def _notable(choice: Choice, lead: Fields) -> FloatArray:
@@ -119,12 +104,6 @@ def _notable(choice: Choice, lead: Fields) -> FloatArray:
         notable = stands_out(moment, name)[:count]
         rows.append(np.where(notable, moment.components(name)[: len(notable)], 0.0))
     return np.concatenate(rows)
-
-
-def _clear(moment: Moment, action: str, foil: str) -> FloatArray:
-    """Returns `[N]`: the running lead, 0 where it is next to nothing."""
-    lead = moment.lead(action, foil)
-    return np.where(np.abs(lead) >= _least_lead(moment, action, foil), lead, 0.0)[:-1]
 
 
 def _least_lead(moment: Moment, action: str, foil: str) -> float:

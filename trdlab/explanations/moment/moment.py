@@ -250,7 +250,6 @@ class Choice:
 CHOICES = Language[Choice](
     "this moment", lambda choice: forms_of(choice.time_axis, choice.moment.seconds_per_step)
 )
-"""What there is to say of a choice."""
 
 
 def moment_of(estimator: Estimator, observation: Any, action_names: Sequence[str]) -> Moment:
@@ -269,8 +268,7 @@ def moment_of(estimator: Estimator, observation: Any, action_names: Sequence[str
     >>> moment_of(exact(coin, TimeAxis(0.5, 1)), 0, ["take", "wait"]).q_value("wait")
     0.5
     """
-    batch = np.asarray(observation)[None]  # [1, ...]
-    told = estimator.decompose(batch)[0].components  # [A, N+1]
+    told = estimator.decompose(np.asarray(observation)[None])[0].components  # [A, N+1]
     exactly = told.astype(np.float64)  # findings compare sums, and float32 sums differ in order
     decomposition = RewardDecomposition(exactly, estimator.time_axis)
     return Moment(decomposition, tuple(action_names), estimator.future)

@@ -8,7 +8,6 @@ from trdlab.arrays import FloatArray
 from trdlab.explanations.moment.moment import CHOICES, Choice, Moment
 from trdlab.explanations.moment.steps import (
     SHARE,
-    effect_of,
     explicit_end,
     largest,
     shares,
@@ -17,21 +16,15 @@ from trdlab.explanations.moment.steps import (
 )
 from trdlab.explanations.rules import Claim, Fields, every
 
-ALIKE = 0.05
-"""How far what is about the same may be from its mean, as a share of that."""
-
-UNEVEN = 0.25
-"""How far the spacings of a rhythm may be from their mean, as a share of it."""
-
+ALIKE = 0.05  # of their mean: how far from it what is about the same may be
+UNEVEN = 0.25  # of their mean: how far from it the spacings of a rhythm may be
 MOST_PEAKS = 4  # that are named one by one
 
 
 def regular(choice: Choice, named: Collection[int] = ()) -> list[Claim]:
     """Returns a rhythm, or the largest component and the peaks, and how wide the highest peak is.
 
-    Args:
-        choice: whose action it is about.
-        named: components that have been told of; if one is about the largest, that is not said.
+    Where one of the components that have been `named` is about the largest, that is not said.
     """
     sizes = np.abs(shares(choice.moment, choice.action))
     is_told = any(i < len(sizes) and sizes[i] >= 1.0 - ALIKE for i in named)
@@ -66,15 +59,16 @@ def peak(choice: Choice) -> Iterator[Fields]:
     is_alone = bool((np.delete(sizes, i) < sizes[i]).all())
     if is_alone and (moment.is_exact or i in peaks(moment, action)):
         value = float(moment.components(action)[i])
-        yield _about(choice) | {"effect": effect_of(value), "component": i, "discounted": value}
+        yield _about(choice) | {"component": i, "discounted": value}
 
 
 @CHOICES.rule("{last_step:within} the {effect:text} expected of {action} peaks {components:whens}.")
 def several_peaks(choice: Choice) -> Iterator[Fields]:
     """The most prominent of several peaks."""
-    found = peaks(choice.moment, choice.action)
+    found, sizes = peaks(choice.moment, choice.action), shares(choice.moment, choice.action)
     if len(found) > 1:
-        yield _about(choice) | {"components": _clearest(choice.moment, choice.action, found)}
+        clearest = sorted(found, key=lambda i: -prominence(sizes, i))[:MOST_PEAKS]
+        yield _about(choice) | {"components": tuple(sorted(clearest))}
 
 
 @CHOICES.rule(
@@ -118,14 +112,12 @@ def spread(choice: Choice) -> Iterator[Fields]:
         yield _about(choice) | fields
 
 
-# ---- the numbers -------------------------------------------------------------------------------
-
-
 def _about(choice: Choice) -> Fields:
     moment, action = choice.moment, choice.action
+    most = undiscounted(moment, action)[largest(moment, action)]
     return {
         "action": action,
-        "effect": effect_of(undiscounted(moment, action)[largest(moment, action)]),
+        "effect": "reward" if most > 0.0 else "cost",
         "last_step": explicit_end(moment, action) * choice.time_axis.width - 1,
     }
 
@@ -167,13 +159,6 @@ def _doubt(moment: Moment, action: str) -> FloatArray:
         return np.zeros(len(row))
     error = np.nan_to_num(errors[: len(row)]) / moment.time_axis.discounts[: len(row)]
     return np.asarray(error / np.abs(row).max())
-
-
-def _clearest(moment: Moment, action: str, found: list[int]) -> tuple[int, ...]:
-    """Returns the most prominent peaks, of equals the earlier, in order of time."""
-    sizes = shares(moment, action)
-    order = sorted(found, key=lambda i: -prominence(sizes, i))
-    return tuple(sorted(order[:MOST_PEAKS]))
 
 
 def _flanks(sizes: FloatArray, at: int) -> tuple[int, int]:

@@ -10,10 +10,10 @@ import numpy as np
 
 from trdlab.explanations.moment.leads import better_of
 from trdlab.explanations.moment.moment import CHOICES, Choice, WhatIf
-from trdlab.explanations.rules import Claim, Fields, every
+from trdlab.explanations.rules import Claim, Fields, Found, every
 from trdlab.formatting import digits_to_tell, plain, said
 
-SAMPLES = 64
+SAMPLES = 64  # pieces into which an interval is cut at first
 _PRECISION = 1e-13
 _DIP_STEPS = 34  # each leaves _GOLDEN of an interval: a ten-millionth in the end
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
@@ -28,27 +28,21 @@ def sensitivity(choice: Choice) -> list[Claim]:
     every value. A preference that stays the same but for ties counts as never flipping; where the
     actions tie as it is, there is no preference to flip.
     """
-    return every(choice, flips, never_flips, several_flips, searched)
+    return every(choice, flips, *in_all, searched)
 
 
-def find_flips(gap: Gap, low: float, high: float, *, samples: int = SAMPLES) -> tuple[float, ...]:
+def find_flips(gap: Gap, low: float, high: float) -> tuple[float, ...]:
     """Returns the values between `low` and `high` at which `gap` changes its sign, in order.
 
-    The interval is sampled evenly and each sign change is refined. Where |gap| dips between
-    three samples of one sign, or towards an end of the interval, its bottom is sought too, for a
-    pair of flips may hide there. A gap that touches zero without crossing it is no flip. Samples
-    prove nothing about what lies between them.
-
-    Args:
-        gap: a continuous function, for example Q(action) − Q(foil) as γ varies.
-        low: the lower end.
-        high: the upper end.
-        samples: into how many pieces the interval is cut at first.
+    The gap is continuous. The interval is sampled evenly and each sign change is refined. Where
+    |gap| dips between three samples of one sign, or towards an end of the interval, its bottom is
+    sought too, for a pair of flips may hide there. A gap that touches zero without crossing it is
+    no flip. Samples prove nothing about what lies between them.
 
     >>> [round(x, 6) for x in find_flips(lambda x: x * x - 0.25, -1, 1)]
     [-0.5, 0.5]
     """
-    known = {float(x): gap(float(x)) for x in np.linspace(low, high, samples + 1)}
+    known = {float(x): gap(float(x)) for x in np.linspace(low, high, SAMPLES + 1)}
     known |= {x: gap(x) for x in _beside_zeros(known)}
     known = dict(sorted(known.items()))
     known |= {x: gap(x) for x in _bottoms(gap, known)}
@@ -157,20 +151,24 @@ def flips(choice: Choice) -> Iterator[Fields]:
                 yield {"better": better, "worse": worse} | _bounds(of, side, (side[0] + end) / 2)
 
 
-@CHOICES.rule("No value that was tried for {quantity:text} makes {worse} better than {better}.")
-def never_flips(choice: Choice) -> Iterator[Fields]:
+@CHOICES.kinds(
+    {
+        "never-flips": (
+            "No value that was tried for {quantity:text} makes {worse} better than {better}."
+        ),
+        "several-flips": (
+            "In all, the preference changes at these values of {quantity:text}: {at:roots}."
+        ),
+    }
+)
+def in_all(choice: Choice) -> Iterator[Found]:
+    """Quantities that never flip it, or more often than at the nearest values."""
     for of, better, worse, roots in _found(choice):
         if not roots:
-            yield {"quantity": of.name, "worse": worse, "better": better}
-
-
-@CHOICES.rule("In all, the preference changes at these values of {quantity:text}: {at:roots}.")
-def several_flips(choice: Choice) -> Iterator[Fields]:
-    """Where there are more flips of one quantity than the nearest."""
-    for of, _, _, roots in _found(choice):
-        if len(roots) > 1:
+            yield "never-flips", {"quantity": of.name, "worse": worse, "better": better}
+        elif len(roots) > 1:
             at = tuple(abs(root) for root in roots)
-            yield {"quantity": of.name, "at": at}
+            yield "several-flips", {"quantity": of.name, "at": at}
 
 
 @CHOICES.rule(
@@ -195,15 +193,16 @@ def _change(found: tuple[WhatIf, str, str, tuple[float, ...]]) -> tuple[bool, fl
 
 def _bounds(of: WhatIf, side: list[float], inside: float) -> Fields:
     """Returns how a sentence says for which values of a quantity the preference is another."""
-    nearest, is_more = abs(side[0]), abs(side[0]) > abs(of.current)
-    present, digits = abs(of.current), digits_to_tell([nearest, abs(of.current)])
+    nearest, present = abs(side[0]), abs(of.current)
+    digits = digits_to_tell([nearest, present])
     fields = {"quantity": of.name, "present": present, "inside": inside, "bounds": tuple(side[:2])}
+    at = said(nearest, digits)
     if len(side) > 1:
         low, high = sorted((nearest, abs(side[1])))
-        at = (f"{said(low, digits)} and {said(high, digits)}",)
-        return fields | {"were": of.verb("were between", "paid between", "cost between"), "at": at}
-    more, less = (
-        of.verb("were above", "paid more than", "cost more than"),
-        of.verb("were below", "paid less than", "cost less than"),
-    )
-    return fields | {"were": more if is_more else less, "at": (said(nearest, digits),)}
+        at = f"{said(low, digits)} and {said(high, digits)}"
+        were = of.verb("were between", "paid between", "cost between")
+    elif nearest > present:
+        were = of.verb("were above", "paid more than", "cost more than")
+    else:
+        were = of.verb("were below", "paid less than", "cost less than")
+    return fields | {"were": were, "at": (at,)}

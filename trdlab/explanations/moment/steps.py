@@ -1,22 +1,14 @@
 """Steps: what one action is expected to pay at each step, and what of that counts."""
 
-from typing import Literal
-
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.explanations.moment.moment import Moment
 
-SHARE = 0.2
-"""What stands out: at least this share of the largest that is expected at any one step."""
-
-NEGLIGIBLE = 0.01
-"""What an exact table expects below this share is not worth a sentence."""
-
+SHARE = 0.2  # of the largest that is expected at any one step: what stands out is at least that
+NEGLIGIBLE = 0.01  # what an exact table expects below this share is not worth a sentence
 LEAST_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25  # what is smaller cannot be taken out
 _ROUNDING = 9  # decimals, of a share of the largest
-
-Effect = Literal["reward", "cost"]
 
 
 def doubtful(moment: Moment, action: str) -> BoolArray:
@@ -28,11 +20,6 @@ def doubtful(moment: Moment, action: str) -> BoolArray:
     if trust is None or moment.is_exact:
         return np.zeros(moment.time_axis.num_components, dtype=np.bool_)
     return trust.doubtful
-
-
-def speaks_of_all(moment: Moment, action: str) -> bool:
-    """Returns whether all components of an action can be told of."""
-    return not doubtful(moment, action).any()
 
 
 def explicit_end(moment: Moment, action: str) -> int:
@@ -52,11 +39,6 @@ def undiscounted(moment: Moment, action: str) -> FloatArray:
     """
     end = explicit_end(moment, action)
     return moment.components(action)[:end] / moment.time_axis.discounts[:end]
-
-
-def effect_of(value: float) -> Effect:
-    """Returns what a reward is called."""
-    return "reward" if value > 0.0 else "cost"
 
 
 def stands_out(moment: Moment, action: str) -> BoolArray:

@@ -156,8 +156,8 @@ def _in_short(claims: list[Claim]) -> list[Claim]:
     {
         "no-chance": "Copies of a state always went the same way, so all that comes can be known.",
         "shared-chance": (
-            "Copies of a state always went the same way, but states that look alike did not: copies "
-            "may share their chance."
+            "Copies of a state always went the same way, but states that look alike did not: the "
+            "copies may share their chance."
         ),
         "cannot-be-known": (
             "Chance decides what comes {component:when}: even a perfect forecast would beat a "

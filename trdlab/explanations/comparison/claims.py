@@ -82,7 +82,7 @@ def how_much(comparison: Comparison) -> Iterator[Found]:
 
 
 @COMPARISONS.rule(
-    "Asked about one and the same action, they differ by {distance:number} on average."
+    "For the same action in the same state, they differ by {distance:number} on average."
 )
 def of_any_action(comparison: Comparison) -> Iterator[Fields]:
     """The sum of |differences| over all components."""
@@ -101,8 +101,8 @@ def agreement(comparison: Comparison) -> Iterator[Fields]:
 
 
 @COMPARISONS.rule(
-    "They differ most in what comes {component:when}: {more:text} expects {by:number} more of it "
-    "than {less:text} on average."
+    "They differ most in what comes {component:when}: of that {more:text} expects {by:number} "
+    "more than {less:text} on average."
 )
 def largest_at(comparison: Comparison) -> Iterator[Fields]:
     """Where the means are furthest apart, if other episodes would not turn that round."""
@@ -114,7 +114,9 @@ def largest_at(comparison: Comparison) -> Iterator[Fields]:
         yield {"component": c, **sides, "by": abs(float(mean[c]))}
 
 
-@COMPARISONS.rule("{share:percent} of their difference comes {components:whens}.")
+@COMPARISONS.rule(
+    "Taken state by state, {share:percent} of their differences come {components:whens}."
+)
 def most_of_it(comparison: Comparison) -> Iterator[Fields]:
     """The fewest components in a row that hold most of the difference; of equals the fullest."""
     size = np.abs(comparison.visits.difference).mean(axis=0)
@@ -182,8 +184,8 @@ def _apart(comparison: Comparison) -> Iterator[tuple[float, FloatArray, int]]:
 
 
 @COMPARISONS.rule(
-    "At {step:step} of {side:text}'s episode with seed {seed:text}: A would do {first_action} and "
-    "expects {first_value:number}, B {second_action} and {second_value:number}."
+    "At {step:step} of {side:text}'s episode with seed {seed:text}: A would do {first_action} "
+    "(expecting {first_value:number}), B {second_action} (expecting {second_value:number})."
 )
 def furthest_apart(comparison: Comparison) -> Iterator[Fields]:
     """The states at which what each expects of its own action is furthest apart."""
@@ -213,8 +215,8 @@ def trusted(comparison: Comparison) -> Iterator[Fields]:
 
 
 @COMPARISONS.rule(
-    "They were compared at {states:states}: half from {episodes:episodes} of A, half from as many "
-    "of B."
+    "They were compared at {states:states}: half from {episodes:episodes} of A, half from "
+    "{episodes:count} of B."
 )
 def compared_at(comparison: Comparison) -> Iterator[Fields]:
     yield {"states": len(comparison.visits), "episodes": comparison.episodes}
@@ -227,14 +229,16 @@ def some_cut_off(comparison: Comparison) -> Iterator[Fields]:
         yield {"episodes": comparison.visits.cut, "steps": comparison.max_steps or 0}
 
 
-@COMPARISONS.rule("Only {different:episodes} were different: too few to tell of others.")
+@COMPARISONS.rule("Only {different:episodes} {are:text} distinct: too few to tell about others.")
 def all_alike(comparison: Comparison) -> Iterator[Fields]:
     if np.isnan(comparison.gap.low):
-        yield {"different": comparison.visits.different}
+        different = comparison.visits.different
+        yield {"different": different, "are": "is" if different == 1 else "are"}
 
 
 @COMPARISONS.rule(
-    "Each tells of its own future, that of {policy:text}: {reward:text}, up to {ending:text}."
+    "Each expects what would follow in its own world if {policy:text} acted: {reward:text}, up to "
+    "{ending:text}."
 )
 def each_tells(comparison: Comparison) -> Iterator[Fields]:
     one, other = comparison.futures

@@ -40,8 +40,7 @@ def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: obje
 @EPISODES.kinds(
     {
         "foreseen-fully": (
-            "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as it could "
-            "be."
+            "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as N allows."
         ),
         "foreseen-before": "{reward:paid} at {step:step} was foreseen {steps:steps} before.",
     },

@@ -111,13 +111,14 @@ def expected(played: Played) -> Iterator[Found]:
     elif len(row) == 1:
         yield "expected-in-all", value
     else:
-        yield "expected-at-start", value | {"component": int(np.abs(row).argmax())}
+        signed = row * np.sign(row.sum() or 1.0)  # the largest part of what it comes to
+        yield "expected-at-start", value | {"component": int(signed.argmax())}
 
 
 @EPISODES.kinds(
     {
-        "nothing-changed": "No step changed what it expected.",
-        "little-changed": "No step changed what it expected by more than {most:bound}.",
+        "nothing-changed": "No step brought a surprise.",
+        "little-changed": "No step changed what was still expected by more than {most:bound}.",
     }
 )
 def changed(played: Played) -> Iterator[Found]:
@@ -142,9 +143,11 @@ def ended(played: Played) -> Iterator[Found]:
 
 @EPISODES.kinds(
     {
-        "as-expected": "Seen from the start it got {got:rewards}{scope:text}, as it had expected.",
+        "as-expected": (
+            "Counted from the start, the agent got {got:rewards}{scope:text}, as it had expected."
+        ),
         "other-than-expected": (
-            "Seen from the start it got {got:rewards}{scope:text}; it had expected "
+            "Counted from the start, the agent got {got:rewards}{scope:text}; it had expected "
             "{expected:number}."
         ),
     }

@@ -194,11 +194,11 @@ def decided_at(choice: Choice) -> Iterator[Fields]:
 @CHOICES.kinds(
     {
         "more-immediate": (
-            "{leader} gives more immediate rewards: {leader_sum:number} {last_step:within}, where "
+            "{leader} gives more immediate rewards: {leader_sum:number} {last_step:within}, while "
             "{other} {other_sum:gives}{averages:averages}."
         ),
         "costs-less": (
-            "{leader} costs less: {leader_cost:size} {last_step:within}, where {other} costs "
+            "{leader} costs less: {leader_cost:size} {last_step:within}, while {other} costs "
             "{other_cost:number}{averages:averages}."
         ),
         "pays-more": (
@@ -220,12 +220,12 @@ def leads(choice: Choice) -> Iterator[Found]:
 @CHOICES.kinds(
     {
         "overtakes": (
-            "After {count:first} {leader} has overtaken {other}: added up, it {leader_sum:gains} "
-            "and {other} {other_sum:gains}{averages:averages}."
+            "After {count:first} {leader} has overtaken {other}: added up, {leader} "
+            "{leader_sum:gains} and {other} {other_sum:gains}{averages:averages}."
         ),
         "makes-up": (
-            "But what comes {component:when} decides: {leader} pays {more:number} more then than "
-            "{other}{averages:averages}."
+            "But what comes {component:when} decides: of that {leader} brings {more:number} more "
+            "than {other}{averages:averages}."
         ),
     }
 )
@@ -243,7 +243,8 @@ def turns(choice: Choice) -> Iterator[Found]:
 
 
 @CHOICES.rule(
-    "Added up step by step, {leader} is never behind {other}: not in {count:first}, nor in the end."
+    "Added up step by step, {leader} is never behind {other}, be it after a few steps, after "
+    "{count:first} or in the end."
 )
 def never_behind(choice: Choice) -> Iterator[Fields]:
     """Step by step its running total is no smaller, and larger in the end; w = 1."""

@@ -108,6 +108,7 @@ def firsts(choice: Choice) -> Iterator[Found]:
     """
     moment, axis, action = choice.moment, choice.time_axis, choice.action
     row, paid = undiscounted(moment, action), outcomes_of(choice)
+    scale = axis.discounts if axis.width > 1 else np.ones(axis.num_components)
     found = []
     for sign, effect in ((1.0, "reward"), (-1.0, "cost")):
         part = np.maximum(sign * row, 0.0)  # [K], how much of it is expected at each step
@@ -133,7 +134,7 @@ def firsts(choice: Choice) -> Iterator[Found]:
             "component": i,
             "earliest": " at the earliest" if i else "",
             "worth": axis.width > 1,
-            "amount": amounts[0] if kind == "first-chance" else mean,
+            "amount": amounts[0] if kind == "first-chance" else mean * scale[i],
             "amounts": amounts,
             "chance": chance,
             "is_sure": is_sure,
@@ -153,7 +154,7 @@ def off_by(choice: Choice) -> Iterator[Fields]:
         yield {"action": choice.action, "component": i, "error": float(errors[i])}
 
 
-@CHOICES.rule("{share:percent} of what {action} is worth comes {component:when}.")
+@CHOICES.rule("{share:percent} of what {action} {pays:text} comes {component:when}.")
 def share_beyond(choice: Choice) -> Iterator[Fields]:
     """The share of the residual; all components have one sign."""
     row, horizon = _row(choice), choice.time_axis.horizon
@@ -161,7 +162,9 @@ def share_beyond(choice: Choice) -> Iterator[Fields]:
     if horizon > 0 and one_sign(row) and not is_doubtful:
         share = float(row[-1] / row.sum())
         if _TOO_LITTLE <= share < 1.0:
-            yield {"share": share, "action": choice.action, "component": horizon}
+            pays = "is worth" if row.sum() > 0.0 else "costs"
+            fields = {"share": share, "action": choice.action, "pays": pays}
+            yield fields | {"component": horizon}
 
 
 @CHOICES.rule(

@@ -12,6 +12,7 @@ from trdlab.explanations.moment.steps import (
     largest,
     shares,
     stands_out,
+    told_at,
     undiscounted,
 )
 from trdlab.explanations.rules import Claim, Fields, every
@@ -40,14 +41,17 @@ def steady(choice: Choice) -> Iterator[Fields]:
         return
     mean = float(row.mean())
     if mean != 0.0 and (np.abs(row - mean) <= ALIKE * abs(mean)).all():
-        is_same = choice.moment.is_sure(choice.action) and bool((row == row[0]).all())
+        is_same = (
+            choice.moment.is_sure(choice.action)
+            and np.ptp(shares(choice.moment, choice.action)) == 0.0
+        )
         fields = {"count": len(row), "action": choice.action, "average": is_same}
         yield fields | {"mean": float(row[0]) if is_same else mean}
 
 
 @CHOICES.rule(
-    "The largest {effect:text} of {action} {last_step:within} comes {component:when}: it is worth "
-    "{discounted:number}."
+    "The largest {effect:text} of {action} {last_step:within} comes {component:when}: it is "
+    "{worth:worth}{amount:number}{average:average}."
 )
 def peak(choice: Choice) -> Iterator[Fields]:
     """The largest of several components, without their discount; of what was learned, a peak."""
@@ -58,8 +62,9 @@ def peak(choice: Choice) -> Iterator[Fields]:
     i = int(sizes.argmax())
     is_alone = bool((np.delete(sizes, i) < sizes[i]).all())
     if is_alone and (moment.is_exact or i in peaks(moment, action)):
-        value = float(moment.components(action)[i])
-        yield _about(choice) | {"component": i, "discounted": value}
+        is_sure = moment.is_sure(action, slice(i, i + 1))
+        fields = {"component": i, "worth": choice.time_axis.width > 1, "average": is_sure}
+        yield _about(choice) | fields | {"amount": abs(told_at(moment, action, i))}
 
 
 @CHOICES.rule("{last_step:within} the {effect:text} expected of {action} peaks {components:whens}.")

@@ -154,10 +154,11 @@ def flips(choice: Choice) -> Iterator[Fields]:
 @CHOICES.kinds(
     {
         "never-flips": (
-            "No value that was tried for {quantity:text} makes {worse} better than {better}."
+            "Whatever value was tried for {quantity:text}, {better} is better than {worse}."
         ),
         "several-flips": (
-            "In all, the preference changes at these values of {quantity:text}: {at:roots}."
+            "Altogether, which of the two is better changes at these values of {quantity:text}: "
+            "{at:roots}."
         ),
     }
 )

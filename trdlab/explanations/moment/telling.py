@@ -53,7 +53,8 @@ def episode_is_over(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "Every other action leaves things as they are, or most likely does, so nothing is compared."
+    "Every other action leaves things as they are, surely or most likely, so there is nothing to "
+    "compare."
 )
 def no_alternative(choice: Choice) -> Iterator[Fields]:
     names, stays = choice.moment.action_names, choice.moment.stays

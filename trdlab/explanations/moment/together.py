@@ -3,20 +3,21 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from trdlab.explanations.moment.forecast import first_expected, first_reward
+from trdlab.explanations.moment.forecast import firsts
 from trdlab.explanations.moment.moment import CHOICES, Choice
 from trdlab.explanations.rules import Fields, every
 
+_TOLD = ("first-reward", "first-expected")
+
 
 @CHOICES.rule(
-    "After either {action} or {foil}, the first {effect:text}{expected:text} comes "
-    "{component:when}."
+    "With {action} as with {foil}, the first {effect:text}{expected:text} comes {component:when}."
 )
 def first_together(choice: Choice) -> Iterator[Fields]:
     """Nothing that stands out comes before it; how much it is may differ."""
     for action, foil in choice.orders[:1]:
         ones, others = (
-            every(replace(choice, action=name, foil=None), first_reward, first_expected)
+            [c for c in every(replace(choice, action=name, foil=None), *firsts) if c.kind in _TOLD]
             for name in (action, foil)
         )
         coming = {(other.kind, other.effect, other.component) for other in others}

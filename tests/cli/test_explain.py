@@ -26,12 +26,12 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(expla
     assert code == 0
     assert out.startswith("drone · step 0 of the episode with seed 0\nγ = 0.95 · N = 4 · w = 1\n")
     assert out.splitlines()[-5:] == [
-        "The agent scored 4 in its one episode, which is the same every time.",
-        "Down gives more immediate rewards: 2.71 in the first 4 steps, where up gives nothing.",
+        "The agent scored 4: its episodes are all the same.",
+        "Down gives more immediate rewards: 2.71 in the first 4 steps, while up gives nothing.",
         "Both pay 4 in total, but each step of waiting makes a reward count 5 % less: "
         "down is worth 3.52, up 3.26.",
         "As forecast, down was worth 0.266 more than up.",
-        "Its forecasts are better than a guess about what comes in the first 4 steps.",
+        "About what comes in the first 4 steps, its forecasts are better than a guess.",
     ]
     moments = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png"]
     names = [*moments, "episode-seed-0.png", "calibration.png"]

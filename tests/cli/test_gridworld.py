@@ -32,7 +32,7 @@ def test_the_papers_numbers(capsys: pytest.CaptureFixture[str]):
     assert "[0.95, 1.76, 0.81]" in rows["down"]
     assert "3.52" in rows["down"]
     headline = (
-        "Down gives more immediate rewards: 2.71 in the first 4 steps, where up gives nothing."
+        "Down gives more immediate rewards: 2.71 in the first 4 steps, while up gives nothing."
     )
     assert headline in " ".join(out.split())
     assert len(out.splitlines()) <= 24

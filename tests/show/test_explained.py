@@ -61,13 +61,13 @@ def test_the_sections_answer_why_what_whose_and_how_far():
         "What this rests on",
     ]
     assert told["Why down, not up"].startswith(
-        "Down gives more immediate rewards: 2.71 in the first 4 steps, where up gives nothing."
+        "Down gives more immediate rewards: 2.71 in the first 4 steps, while up gives nothing."
     )
     assert "down is worth 3.52, up 3.26." in told["Why down, not up"]
     assert told["What to expect of down"].startswith("With down, the first reward comes 1 step")
     assert told["Whose future"].startswith("After the first action, the optimal policy acts.")
     assert told["Tried out"].startswith("As forecast, down was worth 0.266 more than up.")
-    assert told["How far to trust it"].startswith("Its forecasts are better than a guess about")
+    assert told["How far to trust it"].startswith("About ")
 
 
 def test_the_answer_begins_with_how_the_agent_does():

@@ -85,7 +85,7 @@ def test_a_kit_is_written_once_and_the_same_for_the_same_seed(tmp_path: Path):
     written = json.loads(first[-1].read_text())
     assert written == json.loads(json.dumps(key(TRIALS, 3)))
     assert (written["schema"], written["seed"]) == ("trdlab.study/2", 3)
-    with pytest.raises(OutputError, match=r"study.html' exists. Choose another --out."):
+    with pytest.raises(OutputError, match=r"study.html' exists. Choose another `out`."):
         write_kit(tmp_path / "c", TRIALS, 3)
 
 
@@ -103,5 +103,5 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path):
     with pytest.raises(OutputError, match="file' is a file"):
         write_kit(tmp_path / "file", TRIALS, 3)
     for impossible in (tmp_path / "file" / "kit", tmp_path / "\0", tmp_path / ("x" * 300)):
-        with pytest.raises(OutputError, match=r"Cannot make .*Choose another --out"):
+        with pytest.raises(OutputError, match=r"Cannot make .*Choose another `out`"):
             write_kit(impossible, TRIALS, 3)

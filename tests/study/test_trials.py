@@ -12,8 +12,8 @@ from trdlab.study.candidates import LETTERS
 from trdlab.study.trials import Trial, draw, draw_trials
 
 NAMING = re.compile(r"coin|treasure|hazard|\bmap\b|agent|state|\bway\b", re.I)
-COST = re.compile(r"first cost can come in \d+ steps: ([\d.,]+), with a ([\d.]+) % chance")
-REWARD = re.compile(r"first (?:clear )?reward (?:can come|comes) in (\d+) steps")
+COST = re.compile(r"cost of ([\d.,]+) can come \d+ steps? later at [^.]* then is ([\d.]+) %")
+REWARD = re.compile(r"reward (?:of [\d.,]+ can come|comes) (\d+) steps? later")
 
 
 def words(trial: Trial) -> str:
@@ -140,8 +140,8 @@ def test_a_seed_gives_the_same_trials_and_another_one_others():
 
 def test_what_is_told_after_the_answer_is_what_lay_ahead():
     trial = draw_trials(1)[0]
-    assert trial.reason.startswith("Action R pays 14.6 in 2 steps, ")
-    assert "It costs 178 in 8 steps with a chance of 1 %. Action S pays 42.4 in " in trial.reason
+    assert trial.reason.startswith("Action R pays 14.6 (2 steps later), ")
+    assert "It costs 178 (8 steps later) with a chance of 1 %. Action S pays 42.4 (" in trial.reason
 
 
 @pytest.mark.parametrize("count", [0, 4, 33, -3])

@@ -116,10 +116,10 @@ def _described(name: str, way: Way) -> str:
     """Returns what lies on a way as two sentences, rewards first."""
     rewards = [(k, event) for k, event in sorted(way.items()) if event.amount > 0.0]
     ((at, cost),) = [(k, event) for k, event in way.items() if event.amount < 0.0]
-    pays = joined([f"{said(event.amount)} {when_of(TIME_AXIS, k)}" for k, event in rewards])
+    pays = joined([f"{said(event.amount)} ({when_of(TIME_AXIS, k)})" for k, event in rewards])
     sure = rewards[0][1].chance == 1.0
     how = "for sure" if sure else f"each with a chance of {percent(rewards[0][1].chance)} %"
     return (
         f"{name[0].upper()}{name[1:]} pays {pays}, {how}. It costs {said(-cost.amount)} "
-        f"{when_of(TIME_AXIS, at)} with a chance of {percent(cost.chance)} %."
+        f"({when_of(TIME_AXIS, at)}) with a chance of {percent(cost.chance)} %."
     )

@@ -247,11 +247,11 @@ def test_the_first_sentences_say_how_it_does_how_far_to_trust_it_and_what_is_wro
         "to 3.6."
     )
     assert trust.sentence == (
-        "Its forecasts are better than a guess about what comes in the first 8 steps."
+        "About what comes in the first 8 steps, its forecasts are better than a guess."
     )
     assert wrong.kind == "underestimates"
     assert verdicts(report)[1].sentence == (
-        "Its forecasts are no better than a guess about what comes 8 to 11 steps later."
+        "About what comes 8 to 11 steps later, its forecasts are no better than a guess."
     )
     assert to_dict(report)["trusted"]["last_step"] == 7
 
@@ -267,11 +267,11 @@ def test_good_bad_and_not_tested_are_three_things():
     report = judge(Future("a policy"), [one(i) for i in range(50)])  # type: ignore[misc]
     assert report.trust.status == ("good", "bad", "bad", "not tested")
     assert [claim.sentence for claim in verdicts(report)] == [
-        "Its forecasts are right about what comes at once: it was the same every time.",
-        "Its forecasts are wrong about what comes 1 to 2 steps later: 0.1 on average, where 0.75 "
+        "About what comes at once, its forecasts are right: that was the same every time.",
+        "About what comes 1 to 2 steps later, its forecasts are wrong: 0.1 on average, but 0.75 "
         "came every time.",
-        "Its forecasts about what comes after the first 3 steps were not tested: episodes were cut "
-        "off before.",
+        "About what comes after the first 3 steps, its forecasts were not tested: episodes were "
+        "cut off before.",
     ]
 
 
@@ -280,7 +280,7 @@ def test_it_is_said_how_an_agent_does():
     failing = [episode([-1.0] * 500, axis, terminated=False, time_limit=500) for _ in range(12)]
     report = judge(Future("a policy"), failing)
     assert [claim.sentence for claim in sections(report)[0].claims] == [
-        "The agent scored -500 in its one episode, which is the same every time.",
+        "The agent scored -500: its episodes are all the same.",
         "None of these episodes ended before the limit of 500 steps.",
     ]
     some = score_of([episode([1.0] * n, axis) for n in range(10, 22)])
@@ -327,7 +327,7 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
         check("Trust me.", [(REPORTS, real()[0])])
     with pytest.raises(UnsupportedSentenceError, match="is not true of"):
         check(
-            "Its forecasts are better than a guess about what comes in the first 2 steps.",
+            "About what comes in the first 2 steps, its forecasts are better than a guess.",
             [(REPORTS, real()[0])],
         )
 

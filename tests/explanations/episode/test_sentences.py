@@ -35,7 +35,7 @@ WORDS = {
     "largest": "smallest",
     "gained": "lost",
     "foreseen": "missed",
-    ", as early as it could be": "",
+    ", as early as N allows": "",
     "No step": "Every step",
     ", as it had expected": "",
     "a life was lost": "the episode ended",
@@ -203,8 +203,8 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
 def test_a_story_reads_well():
     assert said(tell(real()[0]).claims) == [
         "At the start the agent expected rewards worth 3.52, the largest part 1 step later.",
-        "A reward of 1 at step 3 was foreseen 3 steps before, as early as it could be.",
-        "No step changed what it expected.",
+        "A reward of 1 at step 3 was foreseen 3 steps before, as early as N allows.",
+        "No step brought a surprise.",
         "The episode ended after 5 steps.",
-        "Seen from the start it got rewards worth 3.52, as it had expected.",
+        "Counted from the start, the agent got rewards worth 3.52, as it had expected.",
     ]

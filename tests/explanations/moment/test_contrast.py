@@ -23,7 +23,7 @@ def test_the_drone_prefers_down_because_it_pays_sooner():
     assert (of.action, of.foil) == ("down", "up")
     sooner, discount, first, flip = in_brief(of)
     assert sooner.sentence == (
-        "Down gives more immediate rewards: 2.71 in the first 4 steps, where up gives nothing."
+        "Down gives more immediate rewards: 2.71 in the first 4 steps, while up gives nothing."
     )
     assert sooner.leader_sum == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3)
     assert discount.sentence == (
@@ -76,7 +76,8 @@ def test_without_another_action_that_moves_there_is_nothing_to_compare():
     of = choice("corridor")
     assert (of.action, of.foil) == ("right", None)
     assert in_brief(of)[0].sentence == (
-        "Every other action leaves things as they are, or most likely does, so nothing is compared."
+        "Every other action leaves things as they are, surely or most likely, so there is nothing "
+        "to compare."
     )
 
 
@@ -183,7 +184,7 @@ def pair(a: list[float], b: list[float], **known: Any) -> Choice:
         (
             [1, 0, 0, 0, 0],
             [0, 0, 0, 1, 0.5],
-            "A gives more immediate rewards: 1 in the first step, where b gives nothing, on "
+            "A gives more immediate rewards: 1 in the first step, while b gives nothing, on "
             "average.",
         ),
         (
@@ -204,7 +205,7 @@ def pair(a: list[float], b: list[float], **known: Any) -> Choice:
         (
             [-0.5, -0.5, 3, 0],
             [-1, -1, 3, 0],
-            "A costs less: 1 in the first 2 steps, where b costs 2, on average.",
+            "A costs less: 1 in the first 2 steps, while b costs 2, on average.",
         ),
     ],
 )
@@ -222,14 +223,15 @@ def test_what_makes_up_for_a_lead_follows_it():
     of = pair([0.0, 0.0, 3.0], [1.0, 1.0, 0.2])
     assert [claim.kind for claim in in_brief(of)[:3]] == ["more-immediate", "makes-up", "better"]
     assert said(of, "makes-up") == [
-        "But what comes after the first 2 steps decides: a pays 2.8 more then than b, on average."
+        "But what comes after the first 2 steps decides: of that a brings 2.8 more than b, on "
+        "average."
     ]
 
 
 def test_crossings_are_found_at_their_step():
     of = pair([0.0, 0.0, 3.0, 0.0], [1.0, 0.5, 0.0, 0.0])
     assert said(of, "overtakes") == [
-        "After the first 3 steps a has overtaken b: added up, it gains 3 and b gains 1.5, on "
+        "After the first 3 steps a has overtaken b: added up, a gains 3 and b gains 1.5, on "
         "average."
     ]
 
@@ -239,7 +241,8 @@ def test_an_equal_level_is_no_lead_and_the_residual_is_not_spoken_of_step_by_ste
     assert not of_kind(level, "overtakes")
     ahead = pair([1, 0, 0, 0.5], [0, 0.5, 0, 0])
     assert said(ahead, "never-behind") == [
-        "Added up step by step, a is never behind b: not in the first 3 steps, nor in the end."
+        "Added up step by step, a is never behind b, be it after a few steps, after the first 3 "
+        "steps or in the end."
     ]
     grouped = moment([[1, 0, 0.5], [0, 0.5, 0]], width=2).choice("a", "b")
     assert not of_kind(grouped, "never-behind")

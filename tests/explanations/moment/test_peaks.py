@@ -94,7 +94,7 @@ def test_the_largest_is_that_without_the_discount():
     row[[2, 15]] = [1.0, 1.5]  # 0.90 and 0.69 now
     said = told(learned(row))
     assert said["peak"] == (
-        "The largest reward of go in the first 20 steps comes 15 steps later: it is worth 0.695."
+        "The largest reward of go in the first 20 steps comes 15 steps later: it is 1.5 on average."
     )
 
 

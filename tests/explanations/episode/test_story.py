@@ -148,8 +148,8 @@ def test_what_came_is_held_against_what_was_expected_only_where_it_is_known():
     ends = np.array([True, True])
     lost = played(rows, rewards, life_lost=np.array([True, False]), ends=ends)
     assert tell(lost).end[-1].sentence == (
-        "Counted from the start, the agent got rewards worth 1 up to step 0, where a life was lost; "
-        "it had expected 1.5."
+        "Counted from the start, the agent got rewards worth 1 up to step 0, where a life was "
+        "lost; it had expected 1.5."
     )
 
 

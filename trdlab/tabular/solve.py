@@ -8,7 +8,7 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError, TrdlabError, closest
-from trdlab.tabular.chains import FINE, LEAST, ROUGH, UNIT, Chain, averaging, chain_of, cover
+from trdlab.tabular.chains import LEAST, UNIT, Chain, averaging, chain_of, cover
 from trdlab.tabular.mdp import MDP, SMALL, as_policy
 from trdlab.tabular.sweeps import first_actions, sweep_count, swept
 
@@ -17,10 +17,9 @@ Ties = Literal["lowest", "mixed"]
 _UNDERFLOW = float(np.finfo(np.float64).tiny)  # above what underflowing operations lose together
 _LARGEST_VALUE = 1e140  # leaves room for variances and bounds
 _GAIN = 1e-12  # relative, below which an action is not changed unless it is proven better
-_MOST_SWEEPS = 16_384  # of value iteration between two evaluations
 _MAX_SWEEPS = 2_000
 _MAX_IMPROVEMENTS = 10_000
-_MAX_ROUNDS, _MAX_COVERS = 60, 8
+_MAX_ROUNDS, _MOST_DOUBLED, _MAX_COVERS = 60, 10, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +111,7 @@ def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, Float
     Returns:
         Optimal actions `[S]` and their Q-values `[S, A]`.
     """
-    found = _improved(mdp, gamma, actions, None)
+    found = _improved(mdp, gamma, actions, np.zeros(mdp.num_states))
     return found.actions, mdp.expected_rewards + gamma * mdp.expect(found.values)
 
 
@@ -131,12 +130,12 @@ class _Candidate:
 def _nearly_optimal(mdp: MDP, gamma: float) -> _Candidate:
     """Returns actions that are nearly always optimal."""
     if mdp.num_states <= SMALL:
-        return _improved(mdp, gamma, _greedy_after_sweeps(mdp, gamma), None)
+        return _improved(mdp, gamma, *_greedy_after_sweeps(mdp, gamma))
     return _improved(mdp, gamma, *first_actions(mdp, gamma))
 
 
-def _greedy_after_sweeps(mdp: MDP, gamma: float) -> IntArray:
-    """Returns the actions `[S]` that are greedy after cheap sweeps: nearly always the optimum."""
+def _greedy_after_sweeps(mdp: MDP, gamma: float) -> tuple[IntArray, FloatArray]:
+    """Returns the actions `[S]` that are greedy after cheap sweeps, and the values of those."""
     values, unchanged = np.zeros(mdp.num_states), 0
     last_actions = actions = np.zeros(mdp.num_states, dtype=np.int64)
     for _ in range(_MAX_SWEEPS):
@@ -149,34 +148,29 @@ def _greedy_after_sweeps(mdp: MDP, gamma: float) -> IntArray:
         if unchanged > 30:
             break
         last_actions = actions
-    return actions
+    return actions, values
 
 
-def _improved(mdp: MDP, gamma: float, actions: IntArray, values: FloatArray | None) -> _Candidate:
+def _improved(mdp: MDP, gamma: float, actions: IntArray, values: FloatArray) -> _Candidate:
     """Policy iteration with sweeps of value iteration between the evaluations.
 
-    A change of action spreads by one step in each improvement. So there are several sweeps for
-    each evaluation, and twice as many each time that little was won. Evaluations are exact once
-    no action changes any more; then the gain that counts grows, so that noise comes to an end.
+    A change of action spreads by one step in each improvement. So sweeps go on until the actions
+    stay, or for twice as long as in the round before. The gain that counts grows, so that noise
+    comes to an end.
     """
-    states, sweeps, left = np.arange(mdp.num_states), sweep_count(mdp), mdp.num_states
-    tolerance, margin = (FINE if mdp.num_states <= SMALL else ROUGH), _GAIN
+    states, sweeps, margin = np.arange(mdp.num_states), sweep_count(mdp), _GAIN
     for turn in range(_MAX_ROUNDS):
         chain, rewards = _deterministic(mdp, gamma, actions), mdp.expected_rewards[states, actions]
-        while True:
-            values = chain.solve(rewards, values, tolerance)
-            first = _better(mdp, gamma, values, actions, max(tolerance, margin))
-            if tolerance == FINE or not np.array_equal(first, actions):
-                break
-            tolerance = FINE
-        if np.array_equal(first, actions) or turn == _MAX_ROUNDS - 1:
+        values = chain.solve(rewards, values)
+        better = _better(mdp, gamma, values, actions, margin)
+        if np.array_equal(better, actions) or turn == _MAX_ROUNDS - 1:
             break
-        ahead = swept(mdp, gamma, values, sweeps)
-        then = _better(mdp, gamma, ahead, actions, max(tolerance, margin))
-        changed = int((then != actions).sum())
-        actions, values = (then, ahead) if changed else (first, values)
-        sweeps = min(2 * sweeps, _MOST_SWEEPS) if 2 * changed > left else sweeps
-        left, margin = changed, 1.5 * margin if tolerance == FINE else margin
+        for _ in range(2 ** min(turn, _MOST_DOUBLED)):
+            values = swept(mdp, gamma, values, sweeps)
+            before, better = better, _better(mdp, gamma, values, better, margin)
+            if np.array_equal(better, before):
+                break
+        actions, margin = better, 1.2 * margin
     return _Candidate(actions, chain, values)
 
 

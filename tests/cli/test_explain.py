@@ -69,7 +69,9 @@ def test_the_details_are_all_there_is_to_tell(explain):
     assert len(answer) == 5
     told = [(part["heading"], part["findings"]) for part in data["sections"]]
     lines = [line for heading, found in told for line in (heading, *map(indented, found))]
-    assert out.splitlines()[-len(lines) :] == lines
+    *told_lines, guide = out.splitlines()
+    assert told_lines[-len(lines) :] == lines
+    assert guide == "Every word is explained in “How to read the output” (docs/output.md)."
     headings = ["Why right, not down", "What would change that", "What to expect of right"]
     assert [heading for heading, _ in told][:3] == headings
     assert [heading for heading, _ in told][-1] == "What this rests on"

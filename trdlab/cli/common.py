@@ -14,6 +14,8 @@ from rich.console import Console
 if TYPE_CHECKING:
     from rich.text import Text
 
+_GUIDE = "Every word is explained in “How to read the output” (docs/output.md)."
+
 
 class Ties(StrEnum):
     """Whose future is told where optimal actions tie."""
@@ -159,10 +161,12 @@ def command(words: Sequence[str | float], options: Mapping[str, str | float | No
 
 
 def print_page(thing: Any, *, details: bool) -> None:
-    """Prints a noun of trdlab as people read it."""
+    """Prints a noun of trdlab as people read it; below all there is to tell, where words stand."""
     from trdlab.show.text import text
 
     print_text(text(thing, details=details))
+    if details:
+        print_line(_GUIDE, "dim")
 
 
 def print_line(line: str, style: str = "") -> None:

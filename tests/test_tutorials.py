@@ -204,7 +204,10 @@ def test_sixth_lesson_reads_to_a_student_what_is_wrong() -> None:
     named = {name: [x for x in complaints if x in text] for name, text in reports.items()}
     assert named["Emil"] == ["% of what comes"]
     assert not named["Dora"]
-    assert "About all that comes, its forecasts are better than a guess." in reports["Dora"]
+    assert (
+        "About everything that comes, the agent's forecasts are better than a guess."
+        in reports["Dora"]
+    )
 
 
 @pytest.mark.parametrize("name", exercise.EXERCISES)

@@ -39,3 +39,8 @@ def map_leaves(function: Callable[[Any], Any], tree: Any) -> Any:
         leaves = [map_leaves(function, leaf) for leaf in tree]
         return leaves if isinstance(tree, list) else tuple(leaves)
     return None if tree is None else function(tree)
+
+
+def one_sign(row: FloatArray) -> bool:
+    """Returns whether shares and means of components make sense: one sign, and not all zero."""
+    return bool(row.any() and ((row >= 0.0).all() or (row <= 0.0).all()))

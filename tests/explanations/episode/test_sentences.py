@@ -37,7 +37,7 @@ WORDS = {
     "foreseen": "missed",
     ", as early as N allows": "",
     "No step": "Every step",
-    ", as it had expected": "",
+    ", as the agent had expected": "",
     "a life was lost": "the episode ended",
     "the episode ended": "a life was lost",
     "nothing came": "a reward of 1 came",
@@ -206,5 +206,5 @@ def test_a_story_reads_well():
         "A reward of 1 at step 3 was foreseen 3 steps before, as early as N allows.",
         "No step brought a surprise.",
         "The episode ended after 5 steps.",
-        "Counted from the start, the agent got rewards worth 3.52, as it had expected.",
+        "Counted from the start it came to 3.52, as the agent had expected.",
     ]

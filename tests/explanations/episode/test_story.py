@@ -140,16 +140,16 @@ def test_where_nothing_surprises_nothing_is_made_of_it():
 
 def test_what_came_is_held_against_what_was_expected_only_where_it_is_known():
     rows, rewards = foretold([1.0, 1.0]), [1.0, 3.0]
-    other = "Counted from the start, the agent got rewards worth 2.5; it had expected 1.5."
+    other = "Counted from the start it came to 2.5; the agent had expected 1.5."
     assert tell(played(rows, rewards)).end[-1].sentence == other
-    same = "Counted from the start, the agent got rewards worth 1.5, as it had expected."
+    same = "Counted from the start it came to 1.5, as the agent had expected."
     assert tell(played(rows, [1.0, 1.0])).end[-1].sentence == same
     assert tell(played(rows, rewards, terminated=False)).end[-1].kind == "cut-off"
     ends = np.array([True, True])
     lost = played(rows, rewards, life_lost=np.array([True, False]), ends=ends)
     assert tell(lost).end[-1].sentence == (
-        "Counted from the start, the agent got rewards worth 1 up to step 0, where a life was "
-        "lost; it had expected 1.5."
+        "Counted from the start it came to 1 up to step 0, where a life was "
+        "lost; the agent had expected 1.5."
     )
 
 

@@ -223,8 +223,7 @@ def test_what_makes_up_for_a_lead_follows_it():
     of = pair([0.0, 0.0, 3.0], [1.0, 1.0, 0.2])
     assert [claim.kind for claim in in_brief(of)[:3]] == ["more-immediate", "makes-up", "better"]
     assert said(of, "makes-up") == [
-        "But what comes after the first 2 steps decides: of that a brings 2.8 more than b, on "
-        "average."
+        "But what comes after the first 2 steps decides: there a is ahead by 2.8, on average."
     ]
 
 

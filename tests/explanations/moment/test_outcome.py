@@ -102,9 +102,9 @@ def test_what_came_on_the_ledge_agrees_with_the_exact_values():
     assert in_all.startswith(
         "500 tries of each are too few to tell whether right is worth more than up; about "
     )
-    assert now.startswith("2 steps later right paid 0.6")
+    assert now.startswith("When tried, 2 steps later right paid 0.6")
     assert now.endswith("more than up; the forecast, 0.658, fits.")
-    assert later.startswith("3 steps later up paid 0.")
+    assert later.startswith("When tried, 3 steps later up paid 0.")
     assert later.endswith("more than right; the forecast, 0.5, fits.")
     assert often == "Right and up were each tried 500 times from here."
 
@@ -114,7 +114,7 @@ def test_without_chance_it_says_so_and_gives_no_interval():
     assert [claim.sentence for claim in told(trial)] == [
         "As forecast, down was worth 0.266 more than up.",
         "As forecast, 1 step later down paid 0.95 more than up.",
-        "Down and up were each tried 3 times from here; all tries of one action went the same way.",
+        "Down and up were each tried 3 times from here; each gave the same result every time.",
     ]
 
 

@@ -23,7 +23,7 @@ LITTLE = 0.1
 WORTH_SAYING = 0.005
 """A smaller share is not said."""
 
-OWN, OTHERS = "its forecasts", "forecasts for actions not chosen"
+OWN, OTHERS = "the agent's forecasts", "forecasts for actions not chosen"
 
 Found = Iterator[tuple[str, Fields]]
 
@@ -154,10 +154,12 @@ def _in_short(claims: list[Claim]) -> list[Claim]:
 
 @REPORTS.kinds(
     {
-        "no-chance": "Copies of a state always went the same way, so all that comes can be known.",
+        "no-chance": (
+            "Copies of a state always went on in the same way, so all that comes can be known."
+        ),
         "shared-chance": (
-            "Copies of a state always went the same way, but states that look alike did not: the "
-            "copies may share their chance."
+            "Copies of a state always went on in the same way, but states that look alike did not: "
+            "the copies may share their chance."
         ),
         "cannot-be-known": (
             "Chance decides what comes {component:when}: even a perfect forecast would beat a "

@@ -27,7 +27,9 @@ def _forms(report: CalibrationReport) -> dict[str, Form]:
 
     def comes(span: tuple[int, int], digits: int) -> str:
         is_all = axis.start(span[0]) == 0 and axis.steps(span[1]) is None
-        return "all that comes" if is_all else f"what comes {forms['span'].show(span, digits)}"
+        return (
+            "everything that comes" if is_all else f"what comes {forms['span'].show(span, digits)}"
+        )
 
     return forms | {"comes": Form(comes)}
 
@@ -110,8 +112,8 @@ def beyond(report: CalibrationReport) -> Iterator[tuple[str, Fields]]:
 
 
 @REPORTS.rule(
-    "For the agent a reward {width:steps} later counts {measured:number} times as much; right "
-    "would be {right:number}."
+    "For the agent a reward {width:steps} later counts {measured:number} times as much; it "
+    "should be {right:number}."
 )
 def discount_off(report: CalibrationReport) -> Iterator[Fields]:
     axis = report.time_axis

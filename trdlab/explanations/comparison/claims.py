@@ -10,7 +10,6 @@ from trdlab.explanations.comparison.comparison import COMPARISONS, SIDES, Compar
 from trdlab.explanations.rules import Claim, Fields, Found, every, first
 from trdlab.explanations.sections import Section, at_first
 
-MOST = 0.5  # more than this share of a difference is most of it
 NOTABLE = 0.05  # of all that is expected: the least lead to call one agent later
 FURTHEST = 3  # of the largest disagreements are told
 
@@ -40,7 +39,7 @@ def sections(comparison: Comparison) -> tuple[Section, ...]:
 
 
 def _when(comparison: Comparison) -> list[Claim]:
-    when = every(comparison, largest_at, most_of_it)
+    when = every(comparison, largest_at)
     return when + first(comparison, *later, come_by)
 
 
@@ -112,23 +111,6 @@ def largest_at(comparison: Comparison) -> Iterator[Fields]:
     if comparison.time_axis.horizon and mean[c] != 0.0 and not of.low <= 0.0 <= of.high:
         sides, _ = _sides(mean[c])
         yield {"component": c, **sides, "by": abs(float(mean[c]))}
-
-
-@COMPARISONS.rule(
-    "Taken state by state, {share:percent} of their differences come {components:whens}."
-)
-def most_of_it(comparison: Comparison) -> Iterator[Fields]:
-    """The fewest components in a row that hold most of the difference; of equals the fullest."""
-    size = np.abs(comparison.visits.difference).mean(axis=0)
-    if not size.any():
-        return
-    for count in range(1, len(size)):
-        shares = np.convolve(size / size.sum(), np.ones(count), "valid")
-        begin = int(shares.argmax())
-        if shares[begin] > MOST:
-            components = tuple(range(begin, begin + count))
-            yield {"share": float(shares[begin]), "components": components}
-            return
 
 
 _LATER = (

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trdlab.arrays import same
+from trdlab.arrays import one_sign, same
 from trdlab.explanations.episode.played import EPISODES, Played
 from trdlab.explanations.episode.promises import broken_promises, foreseen
 from trdlab.explanations.episode.surprises import sizes, surprise
@@ -97,7 +97,7 @@ def key_rows(played: Played, count: int, *told: range) -> list[int]:
 @EPISODES.kinds(
     {
         "expected-nothing": "At the start the agent expected no rewards.",
-        "expected-in-all": "At the start the agent expected {value:rewards}.",
+        "expected-in-all": "At the start the agent expected {value:number} in all.",
         "expected-at-start": (
             "At the start the agent expected {value:rewards}, the largest part {component:when}."
         ),
@@ -108,11 +108,10 @@ def expected(played: Played) -> Iterator[Found]:
     value = {"value": float(row.sum())}
     if not row.any():
         yield "expected-nothing", {}
-    elif len(row) == 1:
+    elif len(row) == 1 or not one_sign(row):
         yield "expected-in-all", value
     else:
-        signed = row * np.sign(row.sum() or 1.0)  # the largest part of what it comes to
-        yield "expected-at-start", value | {"component": int(signed.argmax())}
+        yield "expected-at-start", value | {"component": int(np.abs(row).argmax())}
 
 
 @EPISODES.kinds(
@@ -144,10 +143,10 @@ def ended(played: Played) -> Iterator[Found]:
 @EPISODES.kinds(
     {
         "as-expected": (
-            "Counted from the start, the agent got {got:rewards}{scope:text}, as it had expected."
+            "Counted from the start it came to {got:number}{scope:text}, as the agent had expected."
         ),
         "other-than-expected": (
-            "Counted from the start, the agent got {got:rewards}{scope:text}; it had expected "
+            "Counted from the start it came to {got:number}{scope:text}; the agent had expected "
             "{expected:number}."
         ),
     }

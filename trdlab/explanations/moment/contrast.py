@@ -224,8 +224,8 @@ def leads(choice: Choice) -> Iterator[Found]:
             "{leader_sum:gains} and {other} {other_sum:gains}{averages:averages}."
         ),
         "makes-up": (
-            "But what comes {component:when} decides: of that {leader} brings {more:number} more "
-            "than {other}{averages:averages}."
+            "But what comes {component:when} decides: there {leader} is ahead by "
+            "{more:number}{averages:averages}."
         ),
     }
 )

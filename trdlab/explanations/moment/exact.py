@@ -148,7 +148,7 @@ def source_name(world: Gridworld, source: Source) -> str:
     ['the coins', 'the treasure']
     """
     if source.kind == "step":
-        return "each step"
+        return "a step"
     cells = [world.grid.legend[symbol] for row in world.grid.rows for symbol in row]
     count = sum(cell.kind == source.kind and cell.value == source.value for cell in cells)
     alike = {other for other in world.sources if other.kind == source.kind}

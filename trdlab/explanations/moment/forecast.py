@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from trdlab.arrays import RELATIVE_ZERO, FloatArray
+from trdlab.arrays import RELATIVE_ZERO, FloatArray, one_sign
 from trdlab.explanations.moment.chances import either_or, give_or_take, outcomes_of, over, put_at
 from trdlab.explanations.moment.moment import CHOICES, Choice
 from trdlab.explanations.moment.peaks import regular, rhythm, steady
@@ -182,11 +182,6 @@ def centre_of_mass(choice: Choice) -> Iterator[Fields]:
             "last_step": end - 1,
             "step": float(explicit @ np.arange(end) / explicit.sum()),
         }
-
-
-def one_sign(row: FloatArray) -> bool:
-    """Returns whether shares and means of components make sense: one sign, and not all zero."""
-    return bool(row.any() and ((row >= 0.0).all() or (row <= 0.0).all()))
 
 
 def _row(choice: Choice) -> FloatArray:

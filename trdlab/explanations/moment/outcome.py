@@ -77,7 +77,7 @@ TRIALS = Language[Trial]("this trial", _forms)
 
 @TRIALS.rule("{action} and {foil} were each tried {copies:times} from here{how:text}.")
 def tried(trial: Trial) -> Iterator[Fields]:
-    how = "; all tries of one action went the same way" if trial.found.same_every_time else ""
+    how = "; each gave the same result every time" if trial.found.same_every_time else ""
     if not trial.is_seen:
         how = ", but cut off before anything could come"
     yield {"action": trial.action, "foil": trial.foil, "copies": trial.found.copies, "how": how}
@@ -91,7 +91,9 @@ _MORE = "{component:at}{more} {component:paid} %s more than {less}"
 @TRIALS.kinds(
     {
         "came-exactly": f"As forecast, {_MORE % '{said:number}'}.",
-        "came-as-forecast": (f"{_MORE % '{came:estimate}'}; the forecast, {{said:number}}, fits."),
+        "came-as-forecast": (
+            f"When tried, {_MORE % '{came:estimate}'}; the forecast, {{said:number}}, fits."
+        ),
         "by-another-amount": (
             f"{_MORE % '{came:estimate}'}, {{than:text}} than the {{said:number}} that was "
             "forecast."
@@ -104,7 +106,8 @@ _MORE = "{component:at}{more} {component:paid} %s more than {less}"
             "{component:at}{less} {component:paid} {ahead:estimate} more."
         ),
         "no-difference": (
-            f"The forecast was wrong: {_MORE % 'no'}, though {{said:number}} more was forecast."
+            "The forecast was wrong: {component:at}{more} {component:paid} the same as {less}, "
+            "though {said:number} more was forecast."
         ),
         "too-few-tries": (
             "{copies:count} tries of each are too few to tell whether {component:at}{more} "

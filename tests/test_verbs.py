@@ -235,3 +235,22 @@ def test_the_model_of_a_table_alone_is_acted_in():
     assert agent.action_names == ("action 0", "action 1")
     assert isinstance(agent.make(2, 0), ModelEnvironments)
     assert trdlab.explain(agent, episodes=12).choice.action == "action 0"
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        (
+            "agent",
+            "<Agent: drone · TimeAxis(gamma=0.95, horizon=4, width=1) · the optimal policy · ",
+        ),
+        ("estimator", "<ExactTable: <MDP: 14 states, 4 actions> · TimeAxis(gamma=0.95, "),
+        ("world", "<Gridworld: drone · 14 states>"),
+    ],
+)
+def test_what_holds_arrays_is_shown_in_one_line(name, shown):
+    agent = trdlab.agent("gridworld:drone")
+    noun = agent if name == "agent" else getattr(agent, name)
+    assert repr(noun).startswith(shown)
+    assert len(repr(noun)) < 160
+    assert str(agent.world).splitlines() == [">...T", "S####", ">cccC"]

@@ -158,7 +158,7 @@ def test_files_that_cannot_be_read(tmp_path):
     binary.write_bytes(b"S.\xff\xfe")
     huge.write_text("S" + "." * 200_000)
     for name, message in (
-        (binary, "not UTF-8 text.*Save it as UTF-8"),
+        (binary, "is no map: it is not UTF-8 text.* save a map as UTF-8"),
         (huge, "more than 100000 characters.*10000 cells"),
         (tmp_path, r"cannot be read: .*path of a text file"),
         (tmp_path / "missing.txt", "cannot be read: No such file"),

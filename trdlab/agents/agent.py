@@ -47,6 +47,10 @@ class Agent:
     origin: Origin | None = None
     copying: Copying = Copying()  # noqa: RUF009  it is frozen
 
+    def __repr__(self) -> str:
+        axis, policy = self.estimator.time_axis, self.estimator.future.policy
+        return f"<Agent: {self.name} · {axis} · {policy} · {', '.join(self.action_names)}>"
+
     @cached_property
     def interface(self) -> Interface:
         """What it sees and does, by the names that it has for that."""

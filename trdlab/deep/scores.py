@@ -47,7 +47,7 @@ class Scores:
 
     @property
     def mean_length(self) -> float | None:
-        """Their mean length, in agent steps."""
+        """The mean length of the episodes, in agent steps."""
         return float(np.mean([length for _, length in self.recent])) if self.recent else None
 
     def state_dict(self) -> dict[str, Any]:

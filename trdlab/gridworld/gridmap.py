@@ -159,7 +159,8 @@ def load_map(name_or_file: str | Path) -> GridMap:
         with path.open(encoding="utf-8-sig") as file:
             content = file.read(_MAX_CHARACTERS + 1)
     except UnicodeDecodeError as error:
-        raise MapError(f"The map file '{text}' is not UTF-8 text.", "Save it as UTF-8.") from error
+        cause = f"'{text}' is no map: it is not UTF-8 text, as maps are."
+        raise MapError(cause, "For a run, name its folder; save a map as UTF-8.") from error
     except (OSError, ValueError) as error:
         if not path.suffix and len(path.parts) == 1 and isinstance(error, FileNotFoundError):
             raise MapError(

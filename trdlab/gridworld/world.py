@@ -73,6 +73,12 @@ class Gridworld:
 
     action_names = ACTIONS
 
+    def __repr__(self) -> str:
+        return f"<Gridworld: {self.grid.name or 'a map'} · {len(self.states)} states>"
+
+    def __str__(self) -> str:
+        return "\n".join(self.grid.rows)
+
     def __init__(self, grid: GridMap) -> None:
         self.grid = grid
         self.sources = _sources(grid)

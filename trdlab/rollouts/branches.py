@@ -51,7 +51,7 @@ class Branches:
 
     @property
     def samples(self) -> Samples:
-        """The same as M·n samples, for `calibrate`: of foils, this is their calibration."""
+        """All that followed as M·n samples, for `calibrate`; of foils: their calibration."""
         n = self.copies
         known = np.repeat(self.known, n, axis=0)
         return Samples(

@@ -57,6 +57,9 @@ class MDP:
     start: int = 0
     rounded_rows: int = 0
 
+    def __repr__(self) -> str:
+        return f"<MDP: {self.num_states} states, {self.num_actions} actions>"
+
     def __post_init__(self) -> None:
         arrays = (self.next_states, self.probabilities, self.rewards, self.terminated)
         ends = self.offsets[[0, -1]].tolist()

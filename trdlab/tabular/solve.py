@@ -47,6 +47,10 @@ class Solution:
     tied: BoolArray
     is_optimal: bool = False
 
+    def __repr__(self) -> str:
+        kind = "an optimal policy" if self.is_optimal else "a given policy"
+        return f"<Solution: {len(self.policy)} states · γ = {self.gamma} · {kind}>"
+
     @property
     def state_values(self) -> FloatArray:
         """`[S]`: Σ_a π(a|s) Q(s, a)."""

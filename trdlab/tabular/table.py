@@ -38,6 +38,9 @@ class ExactTable:
     decomposition: RewardDecomposition
     future: Future
 
+    def __repr__(self) -> str:
+        return f"<ExactTable: {self.mdp} · {self.time_axis} · {self.future.policy}>"
+
     @property
     def time_axis(self) -> TimeAxis:
         """What the components mean."""

@@ -95,7 +95,7 @@ def smeared(report: CalibrationReport) -> Iterator[Fields]:
     }
 )
 def beyond(report: CalibrationReport) -> Iterator[tuple[str, Fields]]:
-    """It expects more, or less, than if every step paid the most, or the least, that one did.
+    """Expectations of more, or less, than if every step paid the most, or the least, that one did.
 
     Few episodes without any reward, or without any cost, do not tell that none can come.
     """

@@ -206,7 +206,7 @@ def compared_at(comparison: Comparison) -> Iterator[Fields]:
 
 @COMPARISONS.rule("{episodes:episodes} had to be cut off, after {steps:steps} each.")
 def some_cut_off(comparison: Comparison) -> Iterator[Fields]:
-    """They would have gone on, but were not played for longer."""
+    """Episodes that would have gone on, but were not played for longer."""
     if comparison.visits.cut:
         yield {"episodes": comparison.visits.cut, "steps": comparison.max_steps or 0}
 
@@ -232,7 +232,7 @@ def each_tells(comparison: Comparison) -> Iterator[Fields]:
     "{side:text} tells of the future of {policy:text}: {reward:text}, up to {ending:text}."
 )
 def one_tells(comparison: Comparison) -> Iterator[Fields]:
-    """They tell of different kinds of future."""
+    """What each tells of, where these are different kinds of future."""
     if comparison.futures[0] != comparison.futures[1]:
         for side, of in zip(SIDES, comparison.futures, strict=True):
             yield {"side": side, "policy": of.policy, "reward": of.reward, "ending": of.ending}

@@ -47,7 +47,7 @@ def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: obje
     holds=_is_foreseen,
 )
 def told_ahead(played: Played) -> Iterator[Found]:
-    """It was foreseen as early as there was a component for it, or not although it could have."""
+    """Rewards foreseen as early as there was a component for them, or later than that."""
     episode, rewards = played.episode, played.episode.rewards
     if np.ptp(rewards) == 0.0:
         return

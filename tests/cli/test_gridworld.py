@@ -99,7 +99,7 @@ def test_a_map_file(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 
 
 def test_a_gamma_too_close_to_1_is_not_called_exact(capsys: pytest.CaptureFixture[str]):
-    _, out, _ = run(capsys, "gridworld", "--map", "loop", "--gamma", "0.9999999")
+    _, out, _ = run(capsys, "gridworld", "--map", "loop", "--gamma", "0.999999999")
     assert "γ is so close to 1 that Q is only known to" in " ".join(out.split())
     assert "exact" not in out
 

@@ -38,12 +38,12 @@ class LearnedTable:
 
         That is all of a state in which every episode is over.
         """
-        return self.visits == 0
+        return np.asarray(self.visits == 0)
 
     def __str__(self) -> str:
         axis, windows = self.time_axis, int(self.visits.sum())
         told = f"The future of {self.future.policy}: {windows} windows of {axis.width} steps."
-        never = self.unlearned.all(axis=1)
+        never = np.asarray(self.unlearned.all(axis=1))
         if never.any():
             told += f" No window began in {_listed('state', np.flatnonzero(never).tolist())}."
         seldom = np.argwhere(self.unlearned & ~never[:, None]).tolist()

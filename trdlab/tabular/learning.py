@@ -164,8 +164,8 @@ def _explores(
 ) -> BoolArray:
     """Returns `[B]`: where the next action is drawn evenly, whatever the policy says."""
     if is_model:  # at the beginning of each of its windows
-        return builder.elapsed % builder.width == 0
-    return rng.random(builder.num_envs) < chance
+        return np.asarray(builder.elapsed % builder.width == 0)
+    return np.asarray(rng.random(builder.num_envs) < chance)
 
 
 def _drawn(probabilities: FloatArray, rng: "np.random.Generator") -> IntArray:

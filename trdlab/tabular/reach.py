@@ -27,7 +27,7 @@ def _searched(begin: BoolArray, sources: IntArray, targets: IntArray) -> BoolArr
 
     size, first = len(begin), np.flatnonzero(begin)  # a state of its own leads to all of these
     rows = np.concatenate([sources, np.full(len(first), size)])
-    edges = (np.ones(len(rows), dtype=np.bool_), (rows, np.concatenate([targets, first])))
+    edges = (np.ones(len(rows), dtype=np.int8), (rows, np.concatenate([targets, first])))
     order = breadth_first_order(
         csr_array(edges, (size + 1, size + 1)), size, return_predecessors=False
     )

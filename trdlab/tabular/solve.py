@@ -8,18 +8,18 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError, TrdlabError, closest
-from trdlab.tabular.chains import FINE, ROUGH, UNIT, Chain, averaging, chain_of, cover
+from trdlab.tabular.chains import LEAST, UNIT, Chain, averaging, chain_of, cover
 from trdlab.tabular.mdp import MDP, SMALL, as_policy
+from trdlab.tabular.sweeps import first_actions, sweep_count, swept
 
 Ties = Literal["lowest", "mixed"]
 
 _UNDERFLOW = float(np.finfo(np.float64).tiny)  # above what underflowing operations lose together
 _LARGEST_VALUE = 1e140  # leaves room for variances and bounds
 _GAIN = 1e-12  # relative, below which an action is not changed unless it is proven better
-_SWEEPS, _MOST_SWEEPS = 8, 16_384  # of value iteration between two evaluations
 _MAX_SWEEPS = 2_000
 _MAX_IMPROVEMENTS = 10_000
-_MAX_ROUNDS, _MAX_COVERS = 60, 8
+_MAX_ROUNDS, _MOST_DOUBLED, _MAX_COVERS = 60, 10, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def optimal(mdp: MDP, gamma: float, *, ties: Ties = "lowest") -> Solution:
     _check(mdp, gamma)
     if ties not in get_args(Ties):
         raise InputError(f"The ties are {ties!r}.", closest(str(ties), get_args(Ties)))
-    best = _surely_improved(mdp, gamma, *_nearly_optimal(mdp, gamma))
+    best = _surely_improved(mdp, gamma, _nearly_optimal(mdp, gamma))
     bound = best.solution.error_bound + gamma * mdp.expect(_excess(mdp, gamma, best) - best.error)
     q_values = best.solution.q_values
     near = q_values + bound >= (q_values - bound).max(axis=1, keepdims=True)
@@ -94,7 +94,8 @@ def evaluate(mdp: MDP, policy: FloatArray, gamma: float) -> Solution:
             out of reach of double precision.
     """
     _check(mdp, gamma)
-    return _evaluated(mdp, gamma, as_policy(policy, mdp.shape)).solution
+    policy = as_policy(policy, mdp.shape)
+    return _evaluated(mdp, gamma, policy, chain_of(mdp, policy, gamma)).solution
 
 
 def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, FloatArray]:
@@ -110,24 +111,31 @@ def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, Float
     Returns:
         Optimal actions `[S]` and their Q-values `[S, A]`.
     """
-    actions, values = _improved(mdp, gamma, actions, None)
-    return actions, mdp.expected_rewards + gamma * mdp.expect(values)
+    found = _improved(mdp, gamma, actions, np.zeros(mdp.num_states))
+    return found.actions, mdp.expected_rewards + gamma * mdp.expect(found.values)
 
 
 # ---- policy iteration ----------------------------------------------------------------------------
 
 
-def _nearly_optimal(mdp: MDP, gamma: float) -> tuple[IntArray, FloatArray]:
-    """Returns actions `[S]` that are nearly always optimal, and their values `[S]`."""
-    if mdp.num_states <= SMALL:
-        return _improved(mdp, gamma, _greedy_after_sweeps(mdp, gamma), None)
-    from trdlab.tabular.sweeps import first_actions
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """Actions `[S]`, their chain, and about what they are worth `[S]`."""
 
+    actions: IntArray
+    chain: Chain
+    values: FloatArray
+
+
+def _nearly_optimal(mdp: MDP, gamma: float) -> _Candidate:
+    """Returns actions that are nearly always optimal."""
+    if mdp.num_states <= SMALL:
+        return _improved(mdp, gamma, *_greedy_after_sweeps(mdp, gamma))
     return _improved(mdp, gamma, *first_actions(mdp, gamma))
 
 
-def _greedy_after_sweeps(mdp: MDP, gamma: float) -> IntArray:
-    """Returns the actions `[S]` that are greedy after cheap sweeps: nearly always the optimum."""
+def _greedy_after_sweeps(mdp: MDP, gamma: float) -> tuple[IntArray, FloatArray]:
+    """Returns the actions `[S]` that are greedy after cheap sweeps, and the values of those."""
     values, unchanged = np.zeros(mdp.num_states), 0
     last_actions = actions = np.zeros(mdp.num_states, dtype=np.int64)
     for _ in range(_MAX_SWEEPS):
@@ -140,66 +148,54 @@ def _greedy_after_sweeps(mdp: MDP, gamma: float) -> IntArray:
         if unchanged > 30:
             break
         last_actions = actions
-    return actions
+    return actions, values
 
 
-def _improved(
-    mdp: MDP, gamma: float, actions: IntArray, values: FloatArray | None
-) -> tuple[IntArray, FloatArray]:
+def _improved(mdp: MDP, gamma: float, actions: IntArray, values: FloatArray) -> _Candidate:
     """Policy iteration with sweeps of value iteration between the evaluations.
 
-    A change of action spreads by one step in each improvement. So there are several sweeps for
-    each evaluation, and twice as many each time that little was won. Evaluations become more
-    exact from round to round; then the gain that counts grows, so that noise cannot go on for ever.
+    A change of action spreads by one step in each improvement. So sweeps go on until the actions
+    stay, or for twice as long as in the round before. The gain that counts grows, so that noise
+    comes to an end.
     """
-    states, sweeps, left = np.arange(mdp.num_states), _SWEEPS, mdp.num_states
-    tolerance, margin = (FINE if mdp.num_states <= SMALL else ROUGH), _GAIN
-    for _ in range(_MAX_ROUNDS):
+    states, sweeps, margin = np.arange(mdp.num_states), sweep_count(mdp), _GAIN
+    for turn in range(_MAX_ROUNDS):
         chain, rewards = _deterministic(mdp, gamma, actions), mdp.expected_rewards[states, actions]
-        while True:
-            values = chain.solve(rewards, values, tolerance)
-            first = _better(mdp, gamma, values, actions, max(tolerance, margin))
-            if tolerance == FINE or not np.array_equal(first, actions):
-                break
-            tolerance = FINE
-        if np.array_equal(first, actions):
+        values = chain.solve(rewards, values)
+        better = _better(mdp, gamma, values, actions, margin)
+        if np.array_equal(better, actions) or turn == _MAX_ROUNDS - 1:
             break
-        ahead = values
-        for _ in range(sweeps):
-            ahead = (mdp.expected_rewards + gamma * mdp.expect(ahead)).max(axis=1)
-        then = _better(mdp, gamma, ahead, actions, max(tolerance, margin))
-        changed = int((then != actions).sum())
-        actions, values = (then, ahead) if changed else (first, values)
-        sweeps = min(2 * sweeps, _MOST_SWEEPS) if 2 * changed > left else sweeps
-        left, margin = changed, 1.5 * margin if tolerance == FINE else margin
-        tolerance = max(0.1 * tolerance, FINE)
-    return actions, values
+        for _ in range(2 ** min(turn, _MOST_DOUBLED)):
+            values = swept(mdp, gamma, values, sweeps)
+            before, better = better, _better(mdp, gamma, values, better, margin)
+            if np.array_equal(better, before):
+                break
+        actions, margin = better, 1.2 * margin
+    return _Candidate(actions, chain, values)
 
 
 def _better(
     mdp: MDP, gamma: float, values: FloatArray, actions: IntArray, margin: float
 ) -> IntArray:
     """Returns the best actions `[S]` where they win by a relative margin, else those given."""
-    q_values = mdp.expected_rewards + gamma * mdp.expect(values)
+    q_values, size = _q_and_size(mdp, gamma, values)
     states, best = np.arange(mdp.num_states), q_values.argmax(axis=1)
-    size = _sizes(mdp, gamma, values)
     gain = q_values[states, best] - q_values[states, actions]
-    return np.where(
-        gain > margin * np.maximum(size[states, best], size[states, actions]), best, actions
-    )
+    size = np.maximum(np.maximum(size[states, best], size[states, actions]), LEAST)
+    return np.where(gain > margin * size, best, actions)
 
 
-def _surely_improved(
-    mdp: MDP, gamma: float, actions: IntArray, values: FloatArray
-) -> "_Evaluation":
+def _surely_improved(mdp: MDP, gamma: float, begin: _Candidate) -> "_Evaluation":
     """Policy iteration that changes an action only where it is proven better, so it must end."""
+    actions, chain, values = begin.actions, begin.chain, begin.values
     for _ in range(_MAX_IMPROVEMENTS):
-        found = _evaluated(mdp, gamma, _one_hot(actions, mdp.num_actions), values)
+        found = _evaluated(mdp, gamma, _one_hot(actions, mdp.num_actions), chain, values)
         gain = _sure_gains(found.solution)
         better = gain.max(axis=1) > 0.0
         if not better.any():
             return found
-        actions, values = np.where(better, gain.argmax(axis=1), actions), found.values
+        actions = np.where(better, gain.argmax(axis=1), actions)
+        chain, values = _deterministic(mdp, gamma, actions), found.values
     raise TrdlabError(
         f"Policy iteration did not end in {_MAX_IMPROVEMENTS} rounds.", "Report this model."
     )
@@ -221,7 +217,7 @@ def _chosen_without_loss(
     much when it is taken again and again.
     """
     while not np.array_equal(policy, best.solution.policy):
-        chosen = _evaluated(mdp, gamma, policy, best.values)
+        chosen = _evaluated(mdp, gamma, policy, chain_of(mdp, policy, gamma), best.values)
         other = (policy != best.solution.policy).any(axis=1)
         loses = other & (chosen.values + chosen.error < best.values - best.error)
         if not loses.any():
@@ -244,23 +240,23 @@ class _Evaluation:
 
 
 def _evaluated(
-    mdp: MDP, gamma: float, policy: FloatArray, start: FloatArray | None = None
+    mdp: MDP, gamma: float, policy: FloatArray, chain: Chain, start: FloatArray | None = None
 ) -> _Evaluation:
     """Evaluates a policy; the bound is a forward error analysis, state by state.
 
     The computed v misses its own equation v = r + Mv by a residual that is known up to rounding;
     its error is that residual carried along the chain, (I − M)⁻¹·|residual|, or less.
     """
-    chain, average = chain_of(mdp, policy, gamma), averaging(policy)
+    average = averaging(policy)
     rewards = average(mdp.expected_rewards)
     values = chain.solve(rewards, start)
+    q_values, size_of_q = _q_and_size(mdp, gamma, values)
     rounding = UNIT * (8 + mdp.num_actions + chain.terms)
-    size = average(np.abs(mdp.expected_rewards)) + chain.ahead(np.abs(values)) + np.abs(values)
+    size = average(size_of_q) + np.abs(values)
     residual = np.abs(rewards + chain.ahead(values) - values) + rounding * size
     residual += average(mdp.reward_bound) + _UNDERFLOW
     error = cover(chain, residual, gamma)
-    q_values = mdp.expected_rewards + gamma * mdp.expect(values)
-    bound = gamma * mdp.expect(error) * (1.0 + rounding) + _lost(mdp, gamma, values)
+    bound = gamma * mdp.expect(error) * (1.0 + rounding) + _lost(mdp, size_of_q)
     zero = np.abs(q_values) <= bound
     solution = Solution(
         gamma=gamma,
@@ -272,15 +268,17 @@ def _evaluated(
     return _Evaluation(solution, values, residual, error)
 
 
-def _lost(mdp: MDP, gamma: float, values: FloatArray) -> FloatArray:
-    """Returns `[S, A]`: what rounding can do to E[R] + γ·C·values."""
+def _q_and_size(mdp: MDP, gamma: float, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Returns E[R] + γ·C·values `[S, A]`, and the sum of the sizes of its parts."""
+    later = gamma * mdp.expect(values)
+    larger = later if (values >= 0.0).all() else gamma * mdp.expect(np.abs(values))
+    return mdp.expected_rewards + later, np.abs(mdp.expected_rewards) + larger
+
+
+def _lost(mdp: MDP, size: FloatArray) -> FloatArray:
+    """Returns `[S, A]`: what rounding can take from a Q-value of parts of this size."""
     rounding = UNIT * (8 + int(np.diff(mdp.offsets).max()))
-    return mdp.reward_bound + rounding * _sizes(mdp, gamma, values) + _UNDERFLOW
-
-
-def _sizes(mdp: MDP, gamma: float, values: FloatArray) -> FloatArray:
-    """Returns `[S, A]`: the sum of the sizes of what makes up a Q-value."""
-    return np.abs(mdp.expected_rewards) + gamma * mdp.expect(np.abs(values))
+    return mdp.reward_bound + rounding * size + _UNDERFLOW
 
 
 def _excess(mdp: MDP, gamma: float, best: _Evaluation) -> FloatArray:
@@ -291,19 +289,19 @@ def _excess(mdp: MDP, gamma: float, best: _Evaluation) -> FloatArray:
     enough; where a tied action asks for more, it is followed.
     """
     values, states = best.values, np.arange(mdp.num_states)
-    gains = mdp.expected_rewards + gamma * mdp.expect(values) - values[:, None]
-    gains += _lost(mdp, gamma, values) + UNIT * np.abs(values)[:, None]
+    q_values, size = _q_and_size(mdp, gamma, values)
+    gains = q_values - values[:, None]
+    gains += _lost(mdp, size) + UNIT * np.abs(values)[:, None]
     actions, z = best.solution.policy.argmax(axis=1), best.error
     for turn in range(_MAX_COVERS + 1):
         needed = gains + (1.0 + 64 * UNIT) * gamma * mdp.expect(z)
         short = needed.max(axis=1) - z
-        if not (short > 0.0).any():
-            return z
-        if turn < _MAX_COVERS:
-            actions = np.where(short > 0.0, needed.argmax(axis=1), actions)
-            right = np.maximum(1.5 * gains[states, actions], best.residual)
-            z = np.maximum(z, cover(_deterministic(mdp, gamma, actions), right, gamma))
-    return z + 1.01 * float(short.max()) / (1.0 - gamma)
+        if turn == _MAX_COVERS or short.max() <= LEAST:
+            break
+        actions = np.where(short > 0.0, needed.argmax(axis=1), actions)
+        right = np.maximum(1.5 * gains[states, actions], best.residual)
+        z = np.maximum(z, cover(_deterministic(mdp, gamma, actions), right, gamma))
+    return z + 1.01 * max(float(short.max()), 0.0) / (1.0 - gamma)
 
 
 def _deterministic(mdp: MDP, gamma: float, actions: IntArray) -> Chain:

@@ -1,12 +1,12 @@
-"""Nearly optimal actions of large models: modified policy iteration over blocks of states.
+"""Sweeps of value iteration, and nearly optimal actions of a large model by blocks of states.
 
-Three things make it quick. States are ordered by their distance from reward, so that a block is
-fed by the blocks before it, and fits into the cache; and their first values are those of heading
-there. A block rests while nothing that it reads changes, so that work is done only where values
-still move. And evaluating the chosen actions takes a product of S rows, repeated until it pays to
-look at all S·A rows again. Changes are relative, so that far rewards decide as near ones do. See
-Puterman and Shin (1978) for modified policy iteration, and Wingate and Seppi (2005) for
-prioritised blocks.
+Three things make the blocks quick. States are ordered by their distance from reward, so that a
+block is fed by the blocks before it, and fits into the cache; and their first values are those of
+heading there. A block rests while nothing that it reads changes, so that work is done only where
+values still move. And evaluating the chosen actions takes a product of S rows, repeated until it
+pays to look at all S·A rows again. It ends once no action changes any more: what follows is exact
+(see `trdlab.tabular.solve`). See Puterman and Shin (1978) for modified policy iteration, and
+Wingate and Seppi (2005) for prioritised blocks.
 """
 
 from functools import reduce
@@ -15,19 +15,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trdlab.arrays import FloatArray, IntArray
-from trdlab.tabular.mdp import MDP, take_rows
+from trdlab.tabular.mdp import MDP, SMALL, take_rows
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-BLOCK = 2_048
-_NEARLY = 1e-3  # relative change of a sweep, at which values are good enough to choose by
+BLOCK = 16_384
 _BURST, _EVALUATE_TO = 3, 0.1
 # sweeps over a block between two looks at how much it changes, and the part of the last
-# improvement's change to leave
+# improvement's change to leave, if there are several blocks
+_ALONE_BURST, _ALONE_EVALUATE_TO = 8, 1.0  # if there is only one: calls take most of the time
 _MAX_BURSTS = 16  # before all actions are compared again
-_MAX_ROUNDS, _MAX_TURNS = 3, 4  # over all blocks, and in one: it is only a beginning
-_LEAST = 1e-300
+_MAX_ROUNDS = 100
+_NEARLY = 1e-8  # of the largest value: a change that moves no action near by
+_SWEEPS, _WORK = 16, 50_000  # of value iteration; more where they cost next to nothing
 
 
 class _Block:
@@ -53,28 +54,20 @@ class _Block:
         """`[b]`: the chosen ones."""
         return self._rows - self._first_rows
 
-    def settle(self, values: FloatArray) -> float:
-        """Improves and evaluates until little changes; returns the largest change of a sweep."""
-        change = most = self.improve(values)
-        for _ in range(_MAX_TURNS):
-            if change <= _NEARLY:
-                break
-            aim = max(_EVALUATE_TO * change, _NEARLY)
-            for _ in range(_MAX_BURSTS):
-                if self.evaluate(values, _BURST) <= aim:
-                    break
-            change = self.improve(values)
-        return most
+    def improve(self, values: FloatArray) -> tuple[float, bool]:
+        """Applies the Bellman operator in place, and chooses the best actions.
 
-    def improve(self, values: FloatArray) -> float:
-        """Applies the Bellman operator, chooses the best actions; returns the largest change."""
+        Returns:
+            The largest change, and whether an action changed.
+        """
         q_values = self.matrix @ values
         q_values += self.rewards
         rows = q_values.reshape(len(self._rows), -1).argmax(axis=1)  # the first of equals
         rows += self._first_rows
-        if not np.array_equal(rows, self._rows):
+        other = not np.array_equal(rows, self._rows)
+        if other:
             self._choose(rows)
-        return self._replace(values, q_values[rows])
+        return self._replace(values, q_values[rows]), other
 
     def evaluate(self, values: FloatArray, sweeps: int) -> float:
         """Applies the chosen actions' operator some times; returns the last largest change."""
@@ -96,10 +89,22 @@ class _Block:
 
     def _replace(self, values: FloatArray, new: FloatArray) -> float:
         own = values[self.span]
-        size = np.maximum(np.maximum(np.abs(new), np.abs(own)), _LEAST)
-        change = float((np.abs(new - own) / size).max())
+        change = float(np.abs(new - own).max())
         own[:] = new
         return change
+
+
+def sweep_count(mdp: MDP) -> int:
+    """Returns how many sweeps of value iteration take about as long as evaluating a policy."""
+    return _SWEEPS if mdp.num_states <= SMALL else max(_SWEEPS, _WORK // mdp.num_states)
+
+
+def swept(mdp: MDP, gamma: float, values: FloatArray, count: int) -> FloatArray:
+    """Returns the values `[S]` after some sweeps of value iteration."""
+    for _ in range(count):
+        q_values = mdp.expected_rewards + gamma * mdp.expect(values)
+        values = reduce(np.maximum, q_values.T)  # quicker than along a short axis
+    return values
 
 
 def first_actions(mdp: MDP, gamma: float) -> tuple[IntArray, FloatArray]:
@@ -114,15 +119,60 @@ def first_actions(mdp: MDP, gamma: float) -> tuple[IntArray, FloatArray]:
     order = order if mdp.num_states > BLOCK else np.arange(mdp.num_states)
     blocks, readers = _blocks(mdp, gamma, order)
     values, dirty = start[order], set(range(len(blocks)))
+    part = _ALONE_EVALUATE_TO if len(blocks) == 1 else _EVALUATE_TO
     for _ in range(_MAX_ROUNDS):
-        moved = [b for b in sorted(dirty) if blocks[b].settle(values) > _NEARLY]
-        dirty = set().union(*(readers[b] for b in moved))
-        if not dirty:
+        changes, settled = _improve(blocks, values, dirty)
+        allowed = _NEARLY * float(np.abs(values).max())
+        moved = {b for b, change in changes.items() if change > allowed}
+        if settled or not moved:
             break
+        target = max(part * max(changes.values()), allowed)
+        moved |= _evaluate(blocks, readers, values, moved, target, allowed)
+        dirty = set().union(*(readers[b] for b in moved))
     actions, found = np.empty(mdp.num_states, dtype=np.int64), np.empty(mdp.num_states)
     found[order] = values
     actions[order] = np.concatenate([block.actions for block in blocks])
     return actions, found
+
+
+def _improve(
+    blocks: list[_Block], values: FloatArray, todo: set[int]
+) -> tuple[dict[int, float], bool]:
+    """Improves blocks, in place; returns their largest changes, and whether all actions stayed."""
+    changes, settled = {}, True
+    for b in sorted(todo):
+        changes[b], other = blocks[b].improve(values)
+        settled = settled and not other
+    return changes, settled
+
+
+def _evaluate(
+    blocks: list[_Block],
+    readers: list[set[int]],
+    values: FloatArray,
+    todo: set[int],
+    target: float,
+    allowed: float,
+) -> set[int]:
+    """Evaluates blocks, and those that read them, until none changes by more than the target.
+
+    Returns:
+        The blocks that changed by more than `allowed`.
+    """
+    moved: set[int] = set()
+    sweeps = _ALONE_BURST if len(blocks) == 1 else _BURST
+    for _ in range(_MAX_BURSTS):
+        active: set[int] = set()
+        for b in sorted(todo):
+            change = blocks[b].evaluate(values, sweeps)
+            if change > allowed:
+                moved.add(b)
+            if change > target:
+                active |= readers[b]
+        todo = active
+        if not todo:
+            break
+    return moved
 
 
 def _blocks(mdp: MDP, gamma: float, order: IntArray) -> tuple[list[_Block], list[set[int]]]:

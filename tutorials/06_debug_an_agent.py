@@ -273,8 +273,8 @@ add_legend(figure, trust_handles(reports["Ada"]))
 # of one step must be γ^w times component i − 1 of the next. For this it needs no rewards at all.
 #
 # - Ada "expects rewards 1 step too early". All her rewards are there, but in the wrong place.
-# - Ben "discounts what comes 2 steps later by" about 0.95, and not by γ^w, which is 0.9025. He
-#   groups two steps, so from one component to the next two steps pass.
+# - For Ben "a reward 2 steps later counts" about 0.95 times as much; it should be γ^w, which is
+#   0.9025. He groups two steps, so from one component to the next two steps pass.
 # - Cleo "ignores where episodes end". What she adds there is what the start of the next one
 #   promises, all of it. (It is a little more than all, because in her log flights began anywhere.)
 #
@@ -380,8 +380,9 @@ say(claims.sections(emils))
 # %% [markdown]
 # ## Your turn
 #
-# **Exercise 6.1.** An agent has γ = 0.9 and groups of w = 4 steps. Its report says that it
-# discounts what comes 4 steps later by 0.81, and not by 0.656. Which power of γ does its code use?
+# **Exercise 6.1.** An agent has γ = 0.9 and groups of w = 4 steps. Its report says that
+# for it a reward 4 steps later counts 0.81 times as much, and should count 0.656 times as much.
+# Which power of γ does its code use?
 
 # %%
 answer_1 = None  # replace with a whole number

@@ -532,6 +532,15 @@ def test_on_a_terminal_there_is_a_bar():
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
+@pytest.fixture
+def hangs_up():
+    """A closed terminal is heard of, even if the tests were started by `nohup`."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("hangs_up")
 @pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_asks_and_the_next_one_is_not_held_up(number):
     before = {each: signal.getsignal(each) for each in SIGNALS}
@@ -557,6 +566,7 @@ def test_what_nohup_ignores_stays_ignored():
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.usefixtures("hangs_up")
 def test_a_terminal_that_is_closed_stops_and_saves(tmp_path):
     out, (ours, theirs) = tmp_path / "run", pty.openpty()
     words = ["train", "gym", "CartPole-v1", *SMALL, "--agent-steps=1000000", "--out", str(out)]

@@ -21,13 +21,13 @@ class Played:
         episode: what was predicted and what happened.
         action_names: A names.
         seconds_per_step: how long a step takes as people play, if that is known.
-        revision: what each step changed; it follows from the episode.
     """
 
     episode: Episode
     action_names: tuple[str, ...]
     seconds_per_step: float | None = None
     revision: Revision = field(init=False)
+    """What each step changed; it follows from the episode."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "revision", revise(self.episode))

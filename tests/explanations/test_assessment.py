@@ -63,6 +63,18 @@ def test_where_all_episodes_are_the_same_some_actions_are_random():
     assert set(told.calibration.status) == {"open"}
 
 
+def test_the_score_counts_every_episode_however_many_are_alike():
+    score = assess(gridworld_agent("ledge", AXIS), episodes=12).score
+    assert (score.episodes, score.different) == (12, 3)  # eleven pay 1, one costs 1
+    assert score.returns.value == pytest.approx(10.0 / 12.0)  # of the three ways it is 1/3
+
+
+@pytest.mark.parametrize("name", ["ledge", "drone"])
+def test_one_episode_does_not_tell_that_all_are_the_same(name):
+    score = next(iter(calibration.in_brief(assess(gridworld_agent(name, AXIS), episodes=1))))
+    assert score.sentence.endswith(" in one episode.")
+
+
 def test_copies_that_were_not_followed_do_not_tell_that_there_is_no_chance():
     report = assess(gridworld_agent("ledge", TimeAxis(0.95, 0)), episodes=20, copying=Copying())
     assert report.ceiling is not None

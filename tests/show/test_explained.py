@@ -72,7 +72,7 @@ def test_the_sections_answer_why_what_whose_and_how_far():
 
 def test_the_answer_begins_with_how_the_agent_does():
     assert [claim.kind for claim in explained("drone").answer] == [
-        "scored-once",
+        "scored-the-same",
         "more-immediate",
         "better-by-discount",
         "came-exactly",

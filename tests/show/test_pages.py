@@ -90,7 +90,7 @@ def test_a_report_prints_what_matters_most():
         "γ = 0.95 · N = 4 · w = 1",
         "",
     ]
-    assert "the agent scored 0.333 " in told[3]
+    assert told[3] == "Over 12 episodes the agent scored 0.833 each, on average."
     assert 2 <= len(told[3:]) <= 8
     details = text(nouns()["a report"], details=True).plain
     assert "\nWhat this rests on\n  The forecasts were checked on 12 episodes, " in details

@@ -65,6 +65,8 @@ def assess(
     judging, chance = _Judging(agent, episodes, max_steps, seed, watch), epsilon or 0.0
     played, alike = (judging.played(chance), False) if chance else judging.alike()
     score = score_of(played, seed=seed)
+    if alike:
+        played = distinct(played)
     if alike and epsilon is None:
         chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
         played = judging.played(chance)
@@ -103,15 +105,13 @@ class _Judging:
     def alike(self) -> tuple[tuple[Episode, ...], bool]:
         """Returns episodes by the policy alone, and whether they are too much alike to judge by.
 
-        Where all of the first ones are the same, no more are played, and each is given once.
+        Where all of the first ones are the same, no more are played.
         """
         first = min(self.episodes, max(FEWEST_EPISODES, round(_FIRST * self.episodes)))
         played = self.played(0.0, first)
         if self.episodes > first and len(distinct(played)) > 1:
             played += self.played(0.0, before=first)
-        different = distinct(played)
-        alike = len(different) < min(FEWEST_EPISODES, self.episodes)
-        return (different if alike else played), alike
+        return played, len(distinct(played)) < min(FEWEST_EPISODES, self.episodes)
 
     def played(
         self, epsilon: float, end: int | None = None, before: int = 0

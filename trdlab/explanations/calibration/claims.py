@@ -32,7 +32,8 @@ Found = Iterator[tuple[str, Fields]]
 
 @REPORTS.kinds(
     {
-        "scored-once": ("The agent scored {returns:number}: its episodes are all the same."),
+        "scored-once": "The agent scored {returns:number} in one episode.",
+        "scored-the-same": "The agent scored {returns:number}: its episodes are all the same.",
         "scored-always": "The agent scored {returns:number} in each of {episodes:episodes}.",
         "scored-few": (
             "Over {episodes:episodes} the agent scored {returns:number} each, on average."
@@ -46,8 +47,10 @@ Found = Iterator[tuple[str, Fields]]
 def scores(report: CalibrationReport) -> Found:
     score, mean = report.score, report.score.returns
     scored = {"returns": mean.value, "episodes": score.episodes, "different": score.different}
-    if score.different == 1:
+    if score.episodes == 1:
         yield "scored-once", scored
+    elif score.different == 1:
+        yield "scored-the-same", scored
     elif mean.low == mean.high:
         yield "scored-always", scored
     elif mean.low < mean.high:

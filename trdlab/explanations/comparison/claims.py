@@ -19,9 +19,8 @@ def in_brief(comparison: Comparison) -> list[Claim]:
     told = [*first(comparison, nothing_differs, *how_much), *_when(comparison)[:1]]
     told += every(comparison, agreement)
     said = every(comparison, trusted)
-    sides = [claim.side for claim in said]
-    begins = [sides.index(side) for side in SIDES if side in sides]
-    return list(at_first([*told, *(claim for i in begins for claim in said[i + 1 : i + 2])]))
+    trust = (claim for side in SIDES for claim in [of for of in said if of.side == side][1:2])
+    return list(at_first([*told, *trust]))
 
 
 def sections(comparison: Comparison) -> tuple[Section, ...]:

@@ -159,7 +159,7 @@ def test_what_came_is_held_against_what_was_expected_only_where_it_is_known():
 def test_how_long_before_a_reward_was_foreseen():
     rewards = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
     rows = foretold(rewards)
-    fully = "A reward of 1 at step 4 was foreseen 3 steps before, as early as N allows."
+    fully = "A reward of 1 at step 4 was foreseen 3 steps before, as early as it can be told."
     assert said(foreseen(played(rows, rewards))) == [fully]  # t+3 is the last explicit
     rows[2] *= 0.49  # less than half of it
     assert said(foreseen(played(rows, rewards))) == [

@@ -40,7 +40,8 @@ def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: obje
 @EPISODES.kinds(
     {
         "foreseen-fully": (
-            "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as N allows."
+            "{reward:paid} at {step:step} was foreseen {steps:steps} before, as early as it can be "
+            "told."
         ),
         "foreseen-before": "{reward:paid} at {step:step} was foreseen {steps:steps} before.",
     },

@@ -57,7 +57,7 @@ MaxSteps = Annotated[
 Details = Annotated[bool, typer.Option("--details", help="Tell all there is to tell.")]
 
 
-def _import(modules: list[str] | None) -> list[str] | None:
+def _import(modules: list[str] | None) -> list[str]:
     from trdlab.environments.making import import_named
     from trdlab.errors import InputError
 
@@ -68,7 +68,7 @@ def _import(modules: list[str] | None) -> list[str] | None:
             raise InputError(
                 f"'{module}' cannot be imported: {error}.", "Check its name, or correct it."
             ) from error
-    return modules
+    return modules or []  # typer 0.19 converts once more what a callback gives, and wants a list
 
 
 Import = Annotated[

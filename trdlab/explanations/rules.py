@@ -48,14 +48,12 @@ class Rule(Generic[E]):
         kind: as JSON carries it: `first-reward`.
         says: its sentence, with slots `{field:form}`; the form of a bare slot is `action`.
         find: yields, from the evidence, the fields of every such claim that is true.
-        holds: a second opinion, by the definition rather than by the search, on claims found.
     """
 
     language: "Language[E]"
     kind: str
     says: str
     find: Callable[[E], Iterable[Fields]]
-    holds: Callable[..., bool] | None = None
 
     def __call__(self, evidence: E) -> "list[Claim]":
         return [Claim(self, evidence, fields) for fields in self.find(evidence)]
@@ -114,40 +112,34 @@ class Language(Generic[E]):
     rules: dict[str, Rule[E]] = field(default_factory=dict)
 
     def rule(
-        self, says: str, *, kind: str | None = None, holds: Callable[..., bool] | None = None
+        self, says: str, *, kind: str | None = None
     ) -> Callable[[Callable[[E], Iterable[Fields]]], Rule[E]]:
         """Makes a rule of a function that finds its numbers; its kind is the function's name.
 
         Args:
             says: the sentence, with slots `{field:form}`.
             kind: where one function serves several rules.
-            holds: called with the evidence and, by name, the fields of each claim.
         """
 
         def made(find: Callable[[E], Iterable[Fields]]) -> Rule[E]:
             name = kind or find.__name__.strip("_").replace("_", "-")
             if name in self.rules:
                 raise ValueError(f"there are two rules '{name}' about {self.about}")
-            self.rules[name] = Rule(self, name, says, find, holds)
+            self.rules[name] = Rule(self, name, says, find)
             return self.rules[name]
 
         return made
 
     def kinds(
-        self, says: Mapping[str, str], *, holds: Callable[..., bool] | None = None
+        self, says: Mapping[str, str]
     ) -> Callable[[Callable[[E], Iterable[Found]]], tuple[Rule[E], ...]]:
-        """Makes rules of a function that finds claims of several kinds: each kind and its numbers.
-
-        Args:
-            says: of each kind its sentence.
-            holds: as of `rule`.
-        """
+        """Makes rules of a function that finds claims of several kinds, each with its sentence."""
 
         def made(find: Callable[[E], Iterable[Found]]) -> tuple[Rule[E], ...]:
             def of(kind: str) -> Callable[[E], list[Fields]]:
                 return lambda evidence: [found for own, found in find(evidence) if own == kind]
 
-            return tuple(self.rule(says[kind], kind=kind, holds=holds)(of(kind)) for kind in says)
+            return tuple(self.rule(says[kind], kind=kind)(of(kind)) for kind in says)
 
         return made
 
@@ -163,12 +155,10 @@ class Language(Generic[E]):
     def true(self, sentence: str, evidence: E) -> Claim | None:
         """Returns the claim that a sentence makes, if it is one of these rules' and true."""
         for rule in self.rules.values():
-            if not _skeleton(rule.says).fullmatch(sentence):
-                continue
-            for claim in rule(evidence):
-                is_sound = rule.holds is None or rule.holds(evidence, **claim.fields)
-                if is_sound and claim.sentence == sentence:
-                    return claim
+            if _skeleton(rule.says).fullmatch(sentence):
+                for claim in rule(evidence):
+                    if claim.sentence == sentence:
+                        return claim
         return None
 
     def knows(self, sentence: str) -> bool:

@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mutants
+from definitions import holds
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explanations.episode.played import EPISODES, Played
-from trdlab.explanations.episode.promises import foreseen
+from trdlab.explanations.episode.promises import foreseen, overdue, told_ahead
 from trdlab.explanations.episode.story import tell
 from trdlab.explanations.episode.surprises import sizes, surprise
-from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check
+from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check, every
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.rollouts.episodes import Episode, collect
 from trdlab.rollouts.realised import what_followed
@@ -153,10 +154,16 @@ def survivors(played: Played) -> list[str]:
     return [mutant for mutant in survived if mutant not in true]
 
 
+def all_hold(played: Played) -> bool:
+    """Whether all rewards that were foreseen, and all promises, are so by their definitions."""
+    return all(map(holds, every(played, *told_ahead, *overdue)))
+
+
 def test_every_sentence_about_a_real_episode_is_supported_and_no_mutation_is():
     for played in real():
         story = tell(played)
         assert read(" ".join(said(story.claims)), played) == said(story.claims)
+        assert all_hold(played)
         assert survivors(played) == []
     assert sum(len(mutations(s)) for p in real() for s in said(tell(p).claims)) > 500
 
@@ -166,6 +173,7 @@ def test_every_sentence_about_a_real_episode_is_supported_and_no_mutation_is():
 def test_every_sentence_about_any_episode_is_supported(played: Played):
     story = tell(played)
     assert read(" ".join(said(story.claims)), played) == said(story.claims)
+    assert all_hold(played)
     assert len(story.claims) <= 8
     assert all(len(text.split()) <= 38 for text in said(story.claims))
     assert story.most is None or story.most in story.moments

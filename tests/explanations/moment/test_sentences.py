@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mutants
+from definitions import holds
 from moments import told, trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
@@ -183,6 +184,7 @@ def read_back(choice: Choice) -> None:
     found = check(" ".join(claim.sentence for claim in claims), [(CHOICES, choice)])
     assert [claim.sentence for claim in found] == [claim.sentence for claim in claims]
     for claim in (*claims, *in_brief(choice)):
+        assert holds(claim), claim.sentence
         assert len(claim.sentence.split()) <= 40, claim.sentence  # slots may hold several words
     assert len(in_brief(choice)) <= 5
 

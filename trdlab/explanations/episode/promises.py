@@ -25,18 +25,6 @@ def foreseen(played: Played) -> list[Claim]:
     return sorted(claims, key=lambda claim: (-abs(claim.reward), -claim.steps, claim.step))
 
 
-def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: object) -> bool:
-    """Returns whether half of a reward was expected of the right component for so many steps.
-
-    The right component of j steps before is the one that covers the step t + j. None is expected
-    across an end, nor of the residual. At the step before these it was not, or could not be.
-    """
-    episode, told = played.episode, range(steps + 1)
-    is_told = all(_can_tell(episode, step, j) and _tells(episode, step, j) for j in told)
-    could = _can_tell(episode, step, steps + 1)
-    return is_told and not (could and _tells(episode, step, steps + 1))
-
-
 @EPISODES.kinds(
     {
         "foreseen-fully": (
@@ -44,8 +32,7 @@ def _is_foreseen(played: Played, reward: float, step: int, steps: int, **_: obje
             "told."
         ),
         "foreseen-before": "{reward:paid} at {step:step} was foreseen {steps:steps} before.",
-    },
-    holds=_is_foreseen,
+    }
 )
 def told_ahead(played: Played) -> Iterator[Found]:
     """Rewards foreseen as early as there was a component for them, or later than that."""
@@ -57,20 +44,6 @@ def told_ahead(played: Played) -> Iterator[Found]:
         fields = {"reward": float(rewards[at]), "step": at, "steps": int(steps[at])}
         kind = "foreseen-fully" if steps[at] == limits[at] else "foreseen-before"
         yield kind, fields | {"limit": int(limits[at])}
-
-
-def _can_tell(episode: Episode, step: int, ahead: int) -> bool:
-    """Returns whether a reward could be told of so many steps ahead."""
-    began = step - ahead
-    in_sight = began >= 0 and ahead < episode.time_axis.num_steps
-    return in_sight and not episode.ends[began:step].any()
-
-
-def _tells(episode: Episode, step: int, ahead: int) -> bool:
-    """Returns whether half of a reward was expected so many steps ahead."""
-    axis, reward = episode.time_axis, episode.rewards[step]
-    expected = episode.predicted[step - ahead, ahead // axis.width] * np.sign(reward)
-    return bool(expected > 0.0 and expected >= HALF * abs(reward) * axis.gamma**ahead)
 
 
 def _foreseen_steps(episode: Episode) -> tuple[IntArray, IntArray]:
@@ -99,27 +72,6 @@ def broken_promises(played: Played) -> list[Claim]:
     return sorted(claims, key=lambda claim: claim.first - claim.last)
 
 
-def _is_overdue(
-    played: Played, first: int, last: int, component: int, came: int | None, **_: object
-) -> bool:
-    """Returns whether a reward stayed so far away from a step to another one, and did not come.
-
-    At all these steps the component is what is promised (see `promised`), which it is not at the
-    step before or after, and no end lies between them. Before it came no w steps on end paid half
-    of what was promised: the least of the component there, without its discount.
-    """
-    episode, total, found = played.episode, len(played.episode), promised(played.episode)
-    is_same = bool((found[first : last + 1] == component).all())
-    begins = first == 0 or episode.ends[first - 1] or found[first - 1] != component
-    stops = last == total - 1 or episode.ends[last] or found[last + 1] != component
-    is_one = not episode.ends[first:last].any()
-    least = float(episode.predicted[first : last + 1, component].min())
-    width, discount = episode.time_axis.width, episode.time_axis.discounts[component]
-    before = range(first, total if came is None else came)
-    paid = [discount * episode.rewards[max(first, i - width + 1) : i + 1].sum() for i in before]
-    return bool(is_same and begins and stops and is_one) and max(paid) < HALF * least
-
-
 _STAYED = "From {first:step} to {last:step} a reward was always {away:text} away"
 
 
@@ -128,8 +80,7 @@ _STAYED = "From {first:step} to {last:step} a reward was always {away:text} away
         "broken-promise": f"{_STAYED}, and never came.",
         "overdue-promise": f"{_STAYED}, and had not come when the episode was cut off.",
         "late-promise": f"{_STAYED}, and came only at {{came:step}}.",
-    },
-    holds=_is_overdue,
+    }
 )
 def overdue(played: Played) -> Iterator[Found]:
     """The stretches of steps at which a promised reward was overdue, and whether it came."""

@@ -256,27 +256,9 @@ def never_behind(choice: Choice) -> Iterator[Fields]:
             yield {"leader": leader, "other": other, "count": axis.horizon}
 
 
-def _is_sufficient(
-    choice: Choice, better: str, worse: str, components: tuple[int, ...], **sums: float
-) -> bool:
-    """Returns whether these components outweigh all that is against, and no fewer do."""
-    delta = choice.moment.difference(better, worse)
-    against = float(-delta[delta < 0].sum())
-    chosen = sorted((float(delta[i]) for i in components), reverse=True)
-    rest = np.delete(delta, components)
-    return (
-        sum(chosen) > against > 0.0
-        and not sum(chosen[:-1]) > against
-        and bool((rest <= chosen[-1]).all())
-        and same(sums["advantage"], sum(chosen))
-        and same(sums["disadvantage"], against)
-    )
-
-
 @CHOICES.rule(
     "What comes {components:whens} is enough to make {better} better: it is {advantage:number} "
-    "ahead then, and {disadvantage:number} behind otherwise.",
-    holds=_is_sufficient,
+    "ahead then, and {disadvantage:number} behind otherwise."
 )
 def reasons(choice: Choice) -> Iterator[Fields]:
     """The fewest components whose advantage outweighs all that speaks for the worse action.

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -127,18 +126,8 @@ def _found(choice: Choice) -> tuple[tuple[WhatIf, str, str, tuple[float, ...]], 
     )
 
 
-def _flips_there(choice: Choice, **claimed: Any) -> bool:
-    """Returns whether the worse action is the better one just beyond each bound of a claim."""
-    of = next(of for of in choice.moment.what_ifs if of.name == claimed["quantity"])
-    i, j = (choice.moment.index(claimed[name]) for name in ("worse", "better"))
-    inside = claimed["inside"]
-    return all(of.gap(i, j, at + (inside - at) * 1e-6) > 0.0 for at in claimed["bounds"])
-
-
 @CHOICES.rule(
-    "{worse} would be better if {quantity:text} {were:text} {at:names} instead of "
-    "{present:number}.",
-    holds=_flips_there,
+    "{worse} would be better if {quantity:text} {were:text} {at:names} instead of {present:number}."
 )
 def flips(choice: Choice) -> Iterator[Fields]:
     """The nearest values, below and above the present one, at which the other action is better."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations.calibration.calibration import Trust
 from trdlab.rollouts.episodes import Episode
 from trdlab.tabular import ExactTable, exact
 from trdlab.tabular.uncertainty import spread

@@ -6,7 +6,7 @@ import numpy as np
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations.calibration.calibration import Trust
 from trdlab.explanations.moment.exact import gridworld_moment
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.telling import sections

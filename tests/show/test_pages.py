@@ -11,10 +11,12 @@ import pytest
 import trdlab
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations import solve_gridworld, solve_tabular
+from trdlab.explanations import solve_state
 from trdlab.explanations.moment.telling import in_brief
+from trdlab.gridworld import Gridworld, load_map
 from trdlab.show.document import document
 from trdlab.show.text import plain_ascii, text
+from trdlab.tabular.toytext import make_world
 
 EVIL = "<script>alert('γ')</script>"
 
@@ -24,8 +26,10 @@ def nouns() -> dict[str, Any]:
     """One of each that is printed."""
     pair = ("gridworld:ledge", "gridworld:ledge,slip=0.3")
     return {
-        "a solved state": solve_gridworld("drone", TimeAxis(0.95, 4)),
-        "a solved state of random moves": solve_tabular("FrozenLake-v1", TimeAxis(0.95, 30)),
+        "a solved state": solve_state(Gridworld(load_map("drone")), TimeAxis(0.95, 4)),
+        "a solved state of random moves": solve_state(
+            make_world("FrozenLake-v1", {}), TimeAxis(0.95, 30)
+        ),
         "an explanation": trdlab.explain("gridworld:ledge", episodes=12),
         "a forecast": trdlab.explain("gridworld:ledge", parts="forecast", episodes=0),
         "a report": trdlab.calibrate("gridworld:ledge", episodes=12),
@@ -127,7 +131,7 @@ def test_what_users_call_things_is_escaped(tmp_path):
     comparison = trdlab.compare(agent, agent, episodes=2)
     path = tmp_path / "evil.txt"
     path.write_text(f"title: {EVIL}\n---\nS..T", encoding="utf-8")
-    solved = solve_gridworld(str(path), TimeAxis(0.9, 2))
+    solved = solve_state(Gridworld(load_map(str(path))), TimeAxis(0.9, 2))
     for noun in (explained, comparison, solved):
         shown = noun._repr_html_()
         assert "<script" not in shown

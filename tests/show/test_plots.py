@@ -26,8 +26,8 @@ from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, OutputError
 from trdlab.estimator import Future
-from trdlab.explanations import Explanation, explain, solve_gridworld, solve_tabular
-from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations import Explanation, explain, solve_state
+from trdlab.explanations.calibration.calibration import Trust
 from trdlab.explanations.moment.exact import tabular_moment
 from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty
 from trdlab.explanations.solved import SolvedState
@@ -46,6 +46,7 @@ from trdlab.show.plots.moment import (
 )
 from trdlab.show.plots.style import action_colours
 from trdlab.tabular import exact
+from trdlab.tabular.toytext import make_world
 
 AXIS = TimeAxis(0.9, 3)
 
@@ -67,8 +68,11 @@ LEARNED = moment([[0.1, 0.5, 0.2, 0.0], [0.3, 0.4, 0.2, 0.1]])
 @cache
 def solved() -> dict[str, SolvedState]:
     axis = TimeAxis(0.95, 4)
-    found = {name: solve_gridworld(name, axis) for name in ("drone", "bridge", "ledge", "windy")}
-    return found | {"FrozenLake": solve_tabular("FrozenLake-v1", axis)}
+    found = {
+        name: solve_state(Gridworld(load_map(name)), axis)
+        for name in ("drone", "bridge", "ledge", "windy")
+    }
+    return found | {"FrozenLake": solve_state(make_world("FrozenLake-v1", {}), axis)}
 
 
 @cache
@@ -155,7 +159,7 @@ def test_a_residual_is_shown_whole_where_the_rest_is_next_to_nothing():
 
 
 def test_what_is_only_there_by_rounding_is_zero_and_has_no_scale():
-    same = solve_gridworld("windy", TimeAxis(0.95, 4), action="down", foil="right")
+    same = solve_state(Gridworld(load_map("windy")), TimeAxis(0.95, 4), action="down", foil="right")
     *_, contrast = solved_figure(same).axes
     assert heights(contrast) == [0.0] * 5
     assert contrast.get_yticks().tolist() == [0.0]

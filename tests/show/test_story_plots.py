@@ -6,7 +6,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations.calibration.calibration import Trust
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import tell
 from trdlab.rollouts.episodes import Episode

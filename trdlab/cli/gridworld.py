@@ -49,7 +49,7 @@ def gridworld(
     if list_maps:
         _list_maps(as_json=as_json)
         return
-    from trdlab.explanations.solved import SolvedState, solve_gridworld
+    from trdlab.explanations.solved import SolvedState, solve_state
     from trdlab.time_axis import TimeAxis
 
     axis = TimeAxis(gamma, horizon, width)
@@ -75,11 +75,9 @@ def gridworld(
         return f"{base} --N {2 * axis.horizon + 2} (a longer horizon)"
 
     common.publish(
-        lambda: solve_gridworld(
-            map_name,
+        lambda: solve_state(
+            Gridworld(load_map(map_name).changed(slip=slip, treasure=treasure)),
             axis,
-            slip=slip,
-            treasure=treasure,
             state=state,
             action=action,
             foil=foil,

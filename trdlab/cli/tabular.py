@@ -64,8 +64,9 @@ def tabular(
     the residual, holds all that comes after N*w steps.
     """
     from trdlab.environments.arguments import parse_arguments, say_arguments
-    from trdlab.explanations.solved import SolvedState, solve_tabular
+    from trdlab.explanations.solved import SolvedState, solve_state
     from trdlab.tabular.named import TabularWorld
+    from trdlab.tabular.toytext import make_world
     from trdlab.time_axis import TimeAxis
 
     axis, arguments = TimeAxis(gamma, horizon, width), parse_arguments(env_arguments or [])
@@ -94,8 +95,13 @@ def tabular(
         return f"{base} --N {2 * axis.horizon + 2} (a longer horizon)"
 
     common.publish(
-        lambda: solve_tabular(
-            env_id, axis, arguments, state=state, action=action, foil=foil, ties=ties.value
+        lambda: solve_state(
+            make_world(env_id, arguments),
+            axis,
+            state=state,
+            action=action,
+            foil=foil,
+            ties=ties.value,
         ),
         plot=plot,
         overwrite=overwrite,

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from trdlab.explanations.rules import UnsupportedSentenceError as UnsupportedSentenceError
     from trdlab.explanations.rules import check as check
     from trdlab.explanations.solved import SolvedState as SolvedState
-    from trdlab.explanations.solved import solve_gridworld as solve_gridworld
-    from trdlab.explanations.solved import solve_tabular as solve_tabular
+    from trdlab.explanations.solved import solve_state as solve_state
 else:
     __getattr__ = lazily(
         __name__,
@@ -38,6 +37,6 @@ else:
             "moment.moment": "Moment moment_of",
             "moment.outcome": "Trial",
             "rules": "Claim UnsupportedSentenceError check",
-            "solved": "SolvedState solve_gridworld solve_tabular",
+            "solved": "SolvedState solve_state",
         },
     )

@@ -1,15 +1,13 @@
 """One state of a solved world: its exact table, and the choice that is explained there."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from trdlab.decomposition import TimeAxis
 from trdlab.explanations.moment.exact import exact_moment
 from trdlab.explanations.moment.moment import Choice
-from trdlab.gridworld import Gridworld, load_map
+from trdlab.gridworld import Gridworld
 from trdlab.printable import Printable
 from trdlab.tabular import ExactTable, Ties, exact
 from trdlab.tabular.named import TabularWorld
@@ -42,68 +40,28 @@ class SolvedState(Printable):
         return float(self.table.solution.error_bound.max())
 
 
-def solve_gridworld(
-    map_name: str,
+def solve_state(
+    world: Gridworld | TabularWorld,
     time_axis: TimeAxis,
-    *,
-    slip: float | None = None,
-    treasure: float | None = None,
-    state: str = "0",
-    action: str | None = None,
-    foil: str | None = None,
-    ties: Ties = "lowest",
-) -> SolvedState:
-    """Loads a map, solves it, and chooses what to explain in one of its states.
-
-    Args:
-        map_name: the name of a built-in map, or a file.
-        time_axis: γ, N and w.
-        slip: a slip probability to use in place of the map's own.
-        treasure: what treasures pay, in place of the map's own.
-        state: the number of a state, or `row,column`.
-        action: the action to explain, by default what the policy does.
-        foil: the action to contrast it with, by default the best real alternative.
-        ties: whose future is told where optimal actions tie.
-
-    Raises:
-        InputError: any of these cannot be used.
-    """
-    grid = load_map(map_name)
-    grid = grid if slip is None else grid.with_slip(slip)
-    grid = grid if treasure is None else grid.with_value("treasure", treasure)
-    world = Gridworld(grid)
-    index = world.find_state(state)
-    table = exact(world.mdp, time_axis, ties=ties)
-    return SolvedState(world, table, index, exact_moment(world, table, index).choice(action, foil))
-
-
-def solve_tabular(
-    env_id: str,
-    time_axis: TimeAxis,
-    arguments: Mapping[str, Any] | None = None,
     *,
     state: str | None = None,
     action: str | None = None,
     foil: str | None = None,
     ties: Ties = "lowest",
 ) -> SolvedState:
-    """Makes an environment, solves its model, and chooses what to explain in one of its states.
+    """Solves a world, and chooses what to explain in one of its states.
 
     Args:
-        env_id: the id of a Gymnasium environment that has a transition table.
+        world: a gridworld, or another model in words.
         time_axis: γ, N and w.
-        arguments: what to make it with.
         state: the number of a state, or its coordinates; by default the likeliest first state.
         action: the action to explain, by default what the policy does.
         foil: the action to contrast it with, by default the best real alternative.
         ties: whose future is told where optimal actions tie.
 
     Raises:
-        InputError: any of these cannot be used.
+        InputError: there is no such state or action, or both actions are the same.
     """
-    from trdlab.tabular.toytext import make_world  # it imports Gymnasium
-
-    world = make_world(env_id, dict(arguments or {}))
     index = world.mdp.start if state is None else world.find_state(state)
     table = exact(world.mdp, time_axis, ties=ties)
     return SolvedState(world, table, index, exact_moment(world, table, index).choice(action, foil))

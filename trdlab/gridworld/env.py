@@ -67,8 +67,7 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
         cell_pixels: int = 64,
     ) -> None:
         grid = map if isinstance(map, GridMap) else load_map(map)
-        grid = grid if slip is None else grid.with_slip(slip)
-        grid = grid if treasure is None else grid.with_value("treasure", treasure)
+        grid = grid.changed(slip=slip, treasure=treasure)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
                 f"The render mode is '{render_mode}'.",

@@ -108,6 +108,11 @@ class GridMap:
             return self.legend[self.rows[row][column]]
         return LEGEND["#"]
 
+    def changed(self, *, slip: float | None = None, treasure: float | None = None) -> "GridMap":
+        """Returns the map with another slip, or other treasures, where these are given."""
+        grid = self if slip is None else self.with_slip(slip)
+        return grid if treasure is None else grid.with_value("treasure", treasure)
+
     def with_slip(self, slip: float) -> "GridMap":
         """Returns the map with another slip probability."""
         return replace(self, slip=_probability("slip", slip))

@@ -18,7 +18,6 @@ from trdlab.explanations.calibration.calibration import Calibration, calibrate
 from trdlab.explanations.calibration.errors import errors_of, is_off
 from trdlab.explanations.calibration.report import score_of
 from trdlab.explanations.calibration.residual import residual_of
-from trdlab.explanations.calibration.trust import trust
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
 from trdlab.rollouts.episodes import Episode, collect
@@ -260,14 +259,14 @@ def test_a_reward_that_is_always_the_same_is_forecast_right_or_wrong(expected, e
     assert found.status == (status,) * 3 + ("not tested",)
     assert found.constant.tolist() == [True, True, True, False]
     assert np.isnan(found.skill.value).all()
-    assert trust(found).components == (3 if status == "good" else 0)
+    assert found.trust.components == (3 if status == "good" else 0)
 
 
 def test_rewards_that_never_come_and_are_not_expected_are_no_evidence():
     found = constant(0.0, 0.0)
     assert set(found.status) == {"not tested"}
-    assert trust(found).last_step is None
-    assert trust(found).doubtful.all()
+    assert found.trust.last_step is None
+    assert found.trust.doubtful.all()
     assert constant(0.0, 1.0).status[:3] == ("bad",) * 3, "a reward that was expected all the time"
 
 
@@ -323,21 +322,21 @@ def test_rewards_of_several_amounts_have_no_reliability():
 def test_a_perfect_table_is_trusted_to_the_end(seed: int):
     calibration = calibrate(played(circuit(), seed=seed))
     assert calibration.is_("not tested").tolist() == [False] * 20 + [True]  # it never ends
-    found = trust(calibration)
+    found = calibration.trust
     assert found.is_whole
     assert found.last_step == 19
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_beyond_step_10_ends_the_trust_there(seed: int):
-    found = trust(calibrate(played(circuit(), noisy, seed=seed)))
+    found = calibrate(played(circuit(), noisy, seed=seed)).trust
     assert (found.components, found.last_step) == (10, 9)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_rewards_predicted_two_steps_late_are_found_and_not_trusted(seed: int):
     episodes = played(circuit(), late, seed=seed)
-    assert trust(calibrate(episodes)).last_step is None
+    assert calibrate(episodes).trust.last_step is None
     found = errors_of(pool(episodes))
     assert found.shift == 2
     assert not is_off(found.amount)
@@ -366,7 +365,7 @@ def test_a_shift_is_found_beside_a_wrong_amount():
 
 
 def test_groups_are_calibrated_and_trusted_in_steps():
-    found = trust(calibrate(played(circuit(TimeAxis(0.95, 5, 4)))))
+    found = calibrate(played(circuit(TimeAxis(0.95, 5, 4)))).trust
     assert found.last_step == 19
 
 

@@ -13,7 +13,7 @@ from definitions import holds
 from moments import told, trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations.calibration.calibration import Trust
 from trdlab.explanations.moment.exact import gridworld_moment, tabular_moment
 from trdlab.explanations.moment.moment import CHOICES, Choice, Moment, Uncertainty, WhatIf
 from trdlab.explanations.moment.telling import in_brief

@@ -30,6 +30,46 @@ NUM_BINS = 10
 _ROUNDING = 1e-12  # relative; rewards that differ by less are the same reward
 
 
+@dataclass(frozen=True)
+class Trust:
+    """How far a forecast can be trusted: as far as all components up to there are good.
+
+    Args:
+        time_axis: what the components mean.
+        status: N+1 of them, as a `Calibration` has found each; the residual is judged by itself.
+    """
+
+    time_axis: TimeAxis
+    status: tuple[Status, ...]
+
+    @property
+    def components(self) -> int:
+        """How many explicit components in a row, from the first on, are good."""
+        explicit = self.status[:-1]
+        return next((i for i, own in enumerate(explicit) if own != "good"), len(explicit))
+
+    @property
+    def residual(self) -> bool:
+        """Whether the residual is good."""
+        return self.status[-1] == "good"
+
+    @property
+    def last_step(self) -> int | None:
+        """The k of `trustworthy to t+k`; None where no step is."""
+        return self.components * self.time_axis.width - 1 if self.components else None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all explicit components are good."""
+        return self.components == self.time_axis.horizon > 0
+
+    @property
+    def doubtful(self) -> BoolArray:
+        """`[N+1]`: the components not to be trusted: from the first on that is not good."""
+        explicit = np.arange(self.time_axis.horizon) >= self.components
+        return np.append(explicit, not self.residual)
+
+
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """How well each component was predicted, over the steps of whole episodes.
@@ -81,6 +121,11 @@ class Calibration:
     def is_(self, status: Status) -> BoolArray:
         """Returns `[N+1]`: the components of a status."""
         return np.array([own == status for own in self.status])
+
+    @property
+    def trust(self) -> Trust:
+        """How far such forecasts can be trusted."""
+        return Trust(self.time_axis, self.status)
 
 
 def calibrate(episodes: Sequence[Episode] | Samples, *, seed: int = 0) -> Calibration:

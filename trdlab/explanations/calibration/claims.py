@@ -5,11 +5,10 @@ from itertools import groupby
 from typing import Any
 
 from trdlab.explanations.calibration import faults
-from trdlab.explanations.calibration.calibration import Calibration, Status
+from trdlab.explanations.calibration.calibration import Calibration, Status, Trust
 from trdlab.explanations.calibration.faults import REPORTS
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.calibration.residual import SHARE
-from trdlab.explanations.calibration.trust import Trust
 from trdlab.explanations.rules import Claim, Fields, every, plain_data
 from trdlab.explanations.sections import Section
 from trdlab.formatting import percent

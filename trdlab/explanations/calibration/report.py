@@ -8,12 +8,11 @@ import numpy as np
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.calibration import Calibration, calibrate
+from trdlab.explanations.calibration.calibration import Calibration, Trust, calibrate
 from trdlab.explanations.calibration.ceiling import Ceiling, ceiling_of
 from trdlab.explanations.calibration.consistency import Consistency, consistency_of
 from trdlab.explanations.calibration.errors import MIN_DISCOUNT, Errors, errors_of
 from trdlab.explanations.calibration.residual import Residual, residual_of
-from trdlab.explanations.calibration.trust import Trust, trust
 from trdlab.printable import Printable
 from trdlab.rollouts.branches import Branches
 from trdlab.rollouts.counterfactual import Seen
@@ -119,12 +118,12 @@ class CalibrationReport(Printable):
     @property
     def trust(self) -> Trust:
         """How far the forecast can be trusted."""
-        return trust(self.calibration)
+        return self.calibration.trust
 
     @property
     def foil_trust(self) -> Trust | None:
         """How far the forecasts of actions can be trusted that the policy would not have taken."""
-        return None if self.foils is None else trust(self.foils)
+        return None if self.foils is None else self.foils.trust
 
     @property
     def time_axis(self) -> TimeAxis:

@@ -15,8 +15,7 @@ from trdlab.explanations.rules import Language
 from trdlab.explanations.words import forms_of
 
 if TYPE_CHECKING:
-    from trdlab.explanations.calibration.calibration import Status
-    from trdlab.explanations.calibration.trust import Trust
+    from trdlab.explanations.calibration.calibration import Status, Trust
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from trdlab.arrays import FloatArray
-from trdlab.explanations.calibration.trust import Trust
+from trdlab.explanations.calibration.calibration import Trust
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import Story, place
 from trdlab.gridworld import Gridworld

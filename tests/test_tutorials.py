@@ -205,7 +205,7 @@ def test_sixth_lesson_reads_to_a_student_what_is_wrong() -> None:
     assert named["Emil"] == ["% of what comes"]
     assert not named["Dora"]
     assert (
-        "About everything that comes, the agent's forecasts are better than a guess."
+        "For everything that comes, the agent's forecasts are better than a guess."
         in reports["Dora"]
     )
 

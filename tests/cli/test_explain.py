@@ -31,7 +31,7 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(expla
         "Both pay 4 in total, but each step of waiting makes a reward count 5 % less: "
         "down is worth 3.52, up 3.26.",
         "As forecast, down was worth 0.266 more than up.",
-        "About what comes in the first 4 steps, the agent's forecasts are better than a guess.",
+        "For what comes in the first 4 steps, the agent's forecasts are better than a guess.",
     ]
     moments = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png"]
     names = [*moments, "episode-seed-0.png", "calibration.png"]

@@ -113,7 +113,7 @@ def test_a_notebook_shows_all_of_it_and_folds_the_details_away(name):
         told = [section.heading, *section.sentences]
         assert all(html.escape(words) in (folded or brief) for words in told)
     assert bool(folded) == page.folded == (name != "a forecast"), "what was asked for is not folded"
-    assert ("<table>" in brief) == ("components:" in str(noun) or "reward at" in str(noun))
+    assert ("<table>" in brief) == ("components:" in str(noun) or "expected at" in str(noun))
 
 
 class Evil:

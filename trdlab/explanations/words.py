@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 from trdlab.explanations.rules import Form
-from trdlab.formatting import percent, plain, said, significant
+from trdlab.formatting import percent, plain, said
 from trdlab.statistics import Estimate
 from trdlab.time_axis import TimeAxis
 
@@ -15,7 +15,7 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
 
     Numbers: `number` (2.71), `size` (2.71, nothing), `gives`, `pays` and `gains` (gives nothing,
     costs 0.5, loses 0.5), `estimate`, `percent`, `chance` (a 5 % chance), `given` (by the user: all
-    its digits), `roots`, `tenths`, `count`, `steps`, `episodes`, `times`, `states`. What is said
+    its digits), `tenths`, `count`, `steps`, `episodes`, `times`, `states`. What is said
     where a flag asks for it: `average` and `averages` (unless it is sure), `worth`, `ties`.
     Time, where the action is the first step: `when` (a component: at once, 3 steps later, after the
     first 4 steps), `whens` (several), `span` (from one to another), `within` (up to a step: in the
@@ -55,7 +55,6 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "percent": _of(lambda share: f"{percent(share)} %"),
         "chance": _of(chance_of),
         "given": _of(plain),
-        "roots": _of(lambda roots: joined([significant(root) for root in roots])),
         "count": _of(lambda count: f"{count:,}"),
         "steps": _of(lambda count: counted(count, "step")),
         "episodes": _of(lambda count: counted(count, "episode")),

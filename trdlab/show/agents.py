@@ -111,7 +111,7 @@ def _means(comparison: Comparison) -> Table:
     shown = np.argsort(-comparison.apart.value, kind="stable")[:_MOST_ROWS] if axis.horizon else ()
     rows = [row(axis.label(c), means[:, c], gap[c]) for c in sorted(map(int, shown))]
     rows.append(row("all of it", means.sum(axis=1), comparison.gap))
-    heading = ("reward at", *SIDES, "B − A", *["95 % interval"] * has_intervals)
+    heading = ("expected at", *SIDES, "B − A", *["95 % interval"] * has_intervals)
     return Table(heading, tuple(rows), "<" + ">" * len(heading[1:]))
 
 

@@ -51,8 +51,8 @@ WORDS = {
     "start": "end",
     "None": "All",
     "this one nothing": "this one all",
-    "the agent's forecasts": "forecasts for actions not chosen",
-    "The agent's forecasts": "Forecasts for actions not chosen",
+    "the agent's forecasts": "forecasts for actions it would not choose",
+    "The agent's forecasts": "Forecasts for actions it would not choose",
 }
 
 
@@ -247,11 +247,11 @@ def test_the_first_sentences_say_how_it_does_how_far_to_trust_it_and_what_is_wro
         "to 3.6."
     )
     assert trust.sentence == (
-        "About what comes in the first 8 steps, the agent's forecasts are better than a guess."
+        "For what comes in the first 8 steps, the agent's forecasts are better than a guess."
     )
     assert wrong.kind == "underestimates"
     assert verdicts(report)[1].sentence == (
-        "About what comes 8 to 11 steps later, the agent's forecasts are no better than a guess."
+        "For what comes 8 to 11 steps later, the agent's forecasts are no better than a guess."
     )
     assert to_dict(report)["trusted"]["last_step"] == 7
 
@@ -267,10 +267,10 @@ def test_good_bad_and_not_tested_are_three_things():
     report = judge(Future("a policy"), [one(i) for i in range(50)])  # type: ignore[misc]
     assert report.trust.status == ("good", "bad", "bad", "not tested")
     assert [claim.sentence for claim in verdicts(report)] == [
-        "About what comes at once, the agent's forecasts are right: that was the same every time.",
-        "About what comes 1 to 2 steps later, the agent's forecasts are wrong: 0.1 on average, "
+        "For what comes at once, the agent's forecasts are right: that was the same every time.",
+        "For what comes 1 to 2 steps later, the agent's forecasts are wrong: 0.1 on average, "
         "but 0.75 came every time.",
-        "About what comes after the first 3 steps, the agent's forecasts were not tested: episodes "
+        "For what comes after the first 3 steps, the agent's forecasts were not tested: episodes "
         "were cut off before.",
     ]
 
@@ -327,7 +327,7 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
         check("Trust me.", [(REPORTS, real()[0])])
     with pytest.raises(UnsupportedSentenceError, match="is not true of"):
         check(
-            "About what comes in the first 2 steps, the agent's forecasts are better than a guess.",
+            "For what comes in the first 2 steps, the agent's forecasts are better than a guess.",
             [(REPORTS, real()[0])],
         )
 

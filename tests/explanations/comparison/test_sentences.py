@@ -280,7 +280,7 @@ def test_the_same_agent_twice_says_so_and_shows_no_table():
     found = lines(real()[3])
     assert found[0] == "A: gridworld:ledge · B: gridworld:ledge"
     assert found[3].startswith("They expect the same of every action, at every state")
-    assert "reward at" not in "".join(found)
+    assert "expected at" not in "".join(found)
 
 
 def test_the_moments_that_are_told_can_be_explained(capsys):

@@ -33,7 +33,7 @@ def test_the_drone_prefers_down_because_it_pays_sooner():
     assert discount.better_value == pytest.approx(GAMMA + GAMMA**2 + GAMMA**3 + GAMMA**4)
     assert discount.worse_value == pytest.approx(4 * GAMMA**4)
     assert first.sentence == "With down, the first reward comes 1 step later: it is 1."
-    assert flip.sentence == "Up would be better if the coins paid less than 0.924 instead of 1."
+    assert flip.sentence == "Up would be better if each coin paid less than 0.924 instead of 1."
 
 
 def test_the_fewest_steps_that_justify_down_are_those_of_its_three_coins():

@@ -78,7 +78,7 @@ def test_the_treasure_and_the_coins_that_flip_the_preference():
     treasure = 1 + GAMMA**-1 + GAMMA**-2 + GAMMA**-3
     assert treasure == pytest.approx(4.3270, abs=5e-5)
     assert at["the treasure"] == pytest.approx((treasure,), abs=1e-9)
-    assert at["the coins"] == pytest.approx((4 / treasure,), abs=1e-9)
+    assert at["each coin"] == pytest.approx((4 / treasure,), abs=1e-9)
     assert "Up would be better if the treasure paid more than 4.33 instead of 4." in said(
         choice(), "flips"
     )
@@ -96,7 +96,7 @@ def test_what_lies_between_two_flips_is_said_to():
     of = replace(known, what_ifs=(dip,)).choice("a", "b")
     assert said(of, "flips") == ["B would be better if γ were between 0.2 and 0.6 instead of 0.9."]
     assert said(of, "several-flips") == [
-        "Altogether, which of the two is better changes at these values of γ: 0.20000 and 0.60000."
+        "The better one of the two changes at each of these values of γ: 0.20000 and 0.60000."
     ]
     cost = WhatIf("the hazards", -4.0, -40.0, 0.0, lambda x: np.array([-1.0 - x, 0.0]))
     of = replace(known, what_ifs=(cost,)).choice("a", "b")
@@ -106,5 +106,5 @@ def test_what_lies_between_two_flips_is_said_to():
 def test_what_was_searched_is_said():
     assert said(choice(), "searched") == [
         "65 values of each were tried, every one with its own best policy: γ from 0.01 to 0.99, "
-        "the coins from 0 to 10 and the treasure from 0 to 40."
+        "each coin from 0 to 10 and the treasure from 0 to 40."
     ]

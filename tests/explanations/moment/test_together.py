@@ -11,7 +11,7 @@ FORK = "c = coin 1\nT = treasure 4 terminal\nC = coin 1 terminal\n---\nScT\nC##"
 
 def test_both_actions_pay_first_at_the_same_step():
     (claim,) = of_kind(choice(Gridworld(parse_map(FORK)), foil="down"), "first-together")
-    assert claim.sentence == "With right as with down, the first reward comes at once."
+    assert claim.sentence == "With both right and down, the first reward comes at once."
     assert (claim.effect, claim.component) == ("reward", 0)
 
 
@@ -19,7 +19,7 @@ def test_both_actions_pay_first_at_the_same_step():
 def test_amounts_and_what_follows_may_differ(sign, effect):
     of = moment([[0, 0, 2 * sign, 0], [0, 0, sign, 5]]).choice(action="a", foil="b")
     assert said(of, "first-together") == [
-        f"With a as with b, the first {effect} to expect comes 2 steps later."
+        f"With both a and b, the first {effect} to expect comes 2 steps later."
     ]
 
 

@@ -12,7 +12,6 @@ from trdlab.explanations.calibration.residual import SHARE
 from trdlab.explanations.rules import Claim, Fields, every, plain_data
 from trdlab.explanations.sections import Section
 from trdlab.formatting import percent
-from trdlab.statistics import FEWEST_EPISODES
 
 SCHEMA = "trdlab.trust/2"
 MOST_VERDICTS = 4
@@ -22,7 +21,7 @@ LITTLE = 0.1
 WORTH_SAYING = 0.005
 """A smaller share is not said."""
 
-OWN, OTHERS = "the agent's forecasts", "forecasts for actions not chosen"
+OWN, OTHERS = "the agent's forecasts", "forecasts for actions it would not choose"
 
 Found = Iterator[tuple[str, Fields]]
 
@@ -67,31 +66,27 @@ def some_ended(report: CalibrationReport) -> Iterator[Fields]:
 
 # ---- how far to trust it -------------------------------------------------------------------------
 
-_FEW = "About {span:comes}, {episodes:count} different episodes are too few to judge {whose:text}"
+_FEW = "For {span:comes}, {whose:text} were tested in only {few:text}"
 
 
 @REPORTS.kinds(
     {
-        "better": "About {span:comes}, {whose:text} are better than a guess.",
-        "right": "About {span:comes}, {whose:text} are right: that was the same every time.",
-        "no-better": "About {span:comes}, {whose:text} are no better than a guess.",
+        "better": "For {span:comes}, {whose:text} are better than a guess.",
+        "right": "For {span:comes}, {whose:text} are right (to a tenth): what came never varied.",
+        "no-better": "For {span:comes}, {whose:text} are no better than a guess.",
         "wrong": (
-            "About {span:comes}, {whose:text} are wrong: {said:number} on average, but "
+            "For {span:comes}, {whose:text} are wrong: {said:number} on average, but "
             "{came:number} came every time."
         ),
-        "too-few": (
-            "About {span:comes}, judging {whose:text} needs {enough:count} different episodes "
-            "instead of {episodes:count}."
-        ),
-        "unsure": f"{_FEW}; about {{enough:count}} would do.",
-        "undecided": f"{_FEW}.",
-        "silent": "About {span:comes}, {whose:text} were not tested: no reward came then.",
-        "unseen": "About {span:comes}, {whose:text} were not tested: {unseen:text}.",
+        "unsure": f"{_FEW}; about {{enough:count}} are needed.",
+        "undecided": f"{_FEW}: too few to tell.",
+        "silent": "For {span:comes}, {whose:text} were not tested: no reward came then.",
+        "unseen": "For {span:comes}, {whose:text} were not tested: {unseen:text}.",
     }
 )
 def judged(report: CalibrationReport) -> Found:
     cut = "episodes were cut off before" if report.judged.truncated else "no episode shows it"
-    unseen = "there were random actions before" if report.judged.epsilon > 0.0 else cut
+    unseen = "in the test, random actions always came first" if report.judged.epsilon > 0.0 else cut
     yield from _verdicts(OWN, report.calibration, unseen)
     if report.foils is not None:
         yield from _verdicts(OTHERS, report.foils, "no copy was played that long")
@@ -99,7 +94,8 @@ def judged(report: CalibrationReport) -> Found:
 
 def _verdicts(whose: str, told: Calibration, unseen: str) -> Found:
     """Yields components in a row of which the same is to be said, with their numbers."""
-    kinds = [_kind(told, i) for i in range(len(told.status))]
+    same = told.constant.tolist()
+    kinds = [_KINDS[own][i] for own, i in zip(told.status, same, strict=True)]
     for kind, run in groupby(range(len(kinds)), key=kinds.__getitem__):
         first, *_, last = (*run,) * 2
         here = slice(first, last + 1)
@@ -107,9 +103,11 @@ def _verdicts(whose: str, told: Calibration, unseen: str) -> Found:
         if kind in ("right", "wrong"):
             came = float(told.mean[here].sum())
             fields |= {"said": came + float(told.bias.value[here].sum()), "came": came}
-        elif kind in ("too-few", "unsure"):
+        elif kind == "unsure":
             needed = [count for count in told.enough[here] if count is not None]
-            fields |= {"episodes": int(told.num_episodes[here].min())}
+            count = int(told.num_episodes[here].min())
+            few = "1 episode" if count == 1 else f"{count:,} different episodes"
+            fields |= {"episodes": count, "few": few}
             if len(needed) > last - first:
                 fields |= {"enough": max(needed)}
             else:
@@ -119,19 +117,13 @@ def _verdicts(whose: str, told: Calibration, unseen: str) -> Found:
         yield kind, fields
 
 
-def _kind(told: Calibration, i: int) -> str:
-    same, changing = _KINDS[told.status[i]]
-    few = told.status[i] == "open" and told.num_episodes[i] < FEWEST_EPISODES
-    return same if told.constant[i] else "too-few" if few else changing
-
-
 _KINDS: dict[Status, tuple[str, str]] = {
-    "good": ("right", "better"),
-    "bad": ("wrong", "no-better"),
+    "good": ("better", "right"),
+    "bad": ("no-better", "wrong"),
     "open": ("unsure", "unsure"),
-    "not tested": ("silent", "unseen"),
+    "not tested": ("unseen", "silent"),
 }
-"""Of each status what is said, where the reward was the same every time and where it was not."""
+"""Of each status what is said, where rewards differed and where it was the same every time."""
 
 
 def verdicts(report: CalibrationReport, whose: str = OWN) -> list[Claim]:
@@ -157,11 +149,12 @@ def _in_short(claims: list[Claim]) -> list[Claim]:
 @REPORTS.kinds(
     {
         "no-chance": (
-            "Copies of a state always went on in the same way, so all that comes can be known."
+            "When a state was played again, the same always followed, so all that comes can be "
+            "known."
         ),
         "shared-chance": (
-            "Copies of a state always went on in the same way, but states that look alike did not: "
-            "the copies may share their chance."
+            "When a state was played again, the same always followed; but states that look alike "
+            "went on differently, so the replays may share their luck."
         ),
         "cannot-be-known": (
             "Chance decides what comes {component:when}: even a perfect forecast would beat a "
@@ -172,7 +165,7 @@ def _in_short(claims: list[Claim]) -> list[Claim]:
             "guess by {ceiling:percent}, this one by {margin:text}."
         ),
         "as-good-as-can-be": (
-            "About what comes {component:when}, its forecasts beat a guess by {skill:percent}, "
+            "For what comes {component:when}, its forecasts beat a guess by {skill:percent}, "
             "about as much as can be."
         ),
     }
@@ -207,12 +200,12 @@ def _known(report: CalibrationReport) -> list[Claim]:
 @REPORTS.kinds(
     {
         "expects-later": (
-            "Of all that the agent expects, {share:percent} comes {component:when}, in one sum "
-            "without a date."
+            "Over all steps played, {share:percent} of what the agent expects comes "
+            "{component:when}, in one sum without a date."
         ),
         "differs-later": (
-            "Of the difference between its best and its next best action, {share:percent} comes "
-            "{component:when}."
+            "Over all steps played, {share:percent} of the difference between its best and its "
+            "next best action comes {component:when}."
         ),
     }
 )
@@ -225,12 +218,13 @@ def later(report: CalibrationReport) -> Found:
 
 
 @REPORTS.rule(
-    "With N = {horizon:count}, at most {share:percent} of the rewards that came would have no date."
+    "With N = {horizon:count}, at least {share:percent} of the rewards that came would be told "
+    "step by step."
 )
 def would_suffice(report: CalibrationReport) -> Iterator[Fields]:
     least = report.residual.sufficient
     if least is not None and least > report.time_axis.horizon:
-        yield {"horizon": least, "share": SHARE}
+        yield {"horizon": least, "share": 1.0 - SHARE}
 
 
 # ---- what it rests on ----------------------------------------------------------------------------

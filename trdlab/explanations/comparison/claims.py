@@ -19,7 +19,7 @@ def in_brief(comparison: Comparison) -> list[Claim]:
     told = [*first(comparison, nothing_differs, *how_much), *_when(comparison)[:1]]
     told += every(comparison, agreement)
     said = every(comparison, trusted)
-    trust = (claim for side in SIDES for claim in [of for of in said if of.side == side][1:2])
+    trust = (claim for side in SIDES for claim in [of for of in said if of.side == side][1:][-1:])
     return list(at_first([*told, *trust]))
 
 
@@ -31,7 +31,7 @@ def sections(comparison: Comparison) -> tuple[Section, ...]:
     parts = (
         Section("differences", "Who expects more, and when", tuple(differences)),
         Section("states", "Where they are furthest apart", tuple(apart)),
-        Section("trust", "How far to trust each", tuple(every(comparison, trusted))),
+        Section("trust", "How far to trust each where A acts", tuple(every(comparison, trusted))),
         Section("grounds", "What this rests on", tuple(grounds)),
     )
     return tuple(part for part in parts if part)
@@ -80,7 +80,8 @@ def how_much(comparison: Comparison) -> Iterator[Found]:
 
 
 @COMPARISONS.rule(
-    "For the same action in the same state, they differ by {distance:number} on average."
+    "Over all actions in all these states, what they expect differs by {distance:number} on "
+    "average."
 )
 def of_any_action(comparison: Comparison) -> Iterator[Fields]:
     """The sum of |differences| over all components."""
@@ -99,8 +100,8 @@ def agreement(comparison: Comparison) -> Iterator[Fields]:
 
 
 @COMPARISONS.rule(
-    "They differ most in what comes {component:when}: of that {more:text} expects {by:number} "
-    "more than {less:text} on average."
+    "They differ most in what comes {component:when}: there {more:text} expects {by:number} more "
+    "than {less:text}, on average."
 )
 def largest_at(comparison: Comparison) -> Iterator[Fields]:
     """Where the means are furthest apart, if other episodes would not turn that round."""
@@ -113,8 +114,8 @@ def largest_at(comparison: Comparison) -> Iterator[Fields]:
 
 
 _LATER = (
-    "{later:text} expects its %s later: {last_step:within}, {later_share:percent} of them have "
-    "come, and {sooner_share:percent} of those of {sooner:text}."
+    "{later:text} expects its %s later: {later_share:percent} of its own come {last_step:within}, "
+    "but {sooner_share:percent} of {sooner:text}'s."
 )
 
 

@@ -53,7 +53,17 @@ class Played:
 def _forms(played: Played) -> dict[str, Form]:
     axis = played.episode.time_axis
     plural = axis.width > 1
+
+    def at(place: tuple[int, int]) -> str:
+        step, component = place
+        ahead = axis.steps(component)
+        if ahead is None:
+            return f"after step {step + axis.start(component) - 1:,}"
+        first, last = step + ahead[0], step + ahead[-1]
+        return f"at step {first:,}" if first == last else f"at steps {first:,} to {last:,}"
+
     return forms_of(axis, played.seconds_per_step) | {
+        "at": Form(lambda place, _: at(place)),
         "rewards": Form(lambda worth, digits: _named(worth, digits, plural=True), abs),
         "paid": Form(lambda paid, digits: _named(paid, digits, plural=plural), abs),
         "bound": Form(lambda most, _: said(_rounded_up(most))),

@@ -98,8 +98,9 @@ def key_rows(played: Played, count: int, *told: range) -> list[int]:
     {
         "expected-nothing": "At the start the agent expected no rewards.",
         "expected-in-all": "At the start the agent expected {value:number} in all.",
-        "expected-at-start": (
-            "At the start the agent expected {value:rewards}, the largest part {component:when}."
+        "expected-at-start": "At the start the agent expected {value:rewards}.",
+        "expected-mostly": (
+            "At the start the agent expected {value:rewards}, most of it {component:when}."
         ),
     }
 )
@@ -110,8 +111,10 @@ def expected(played: Played) -> Iterator[Found]:
         yield "expected-nothing", {}
     elif len(row) == 1 or not one_sign(row):
         yield "expected-in-all", value
+    elif np.abs(row).max() <= 0.5 * np.abs(row).sum():
+        yield "expected-at-start", value
     else:
-        yield "expected-at-start", value | {"component": int(np.abs(row).argmax())}
+        yield "expected-mostly", value | {"component": int(np.abs(row).argmax())}
 
 
 @EPISODES.kinds(
@@ -143,10 +146,10 @@ def ended(played: Played) -> Iterator[Found]:
 @EPISODES.kinds(
     {
         "as-expected": (
-            "Counted from the start it came to {got:number}{scope:text}, as the agent had expected."
+            "What came was worth {got:number} at the start{scope:text}, as the agent had expected."
         ),
         "other-than-expected": (
-            "Counted from the start it came to {got:number}{scope:text}; the agent had expected "
+            "What came was worth {got:number} at the start{scope:text}; the agent had expected "
             "{expected:number}."
         ),
     }
@@ -160,7 +163,7 @@ def outcome(played: Played) -> Iterator[Found]:
         got = float(discounts @ episode.rewards[: until + 1])
         expected = float(episode.expected[0].sum())
         is_close = same(got, expected) or abs(got - expected) <= ROUNDING * played.scale
-        lost = f" up to step {until:,}, where a life was lost"
+        lost = f" (up to step {until:,}, where a life was lost)"
         fields = {
             "got": got,
             "expected": expected,

@@ -23,24 +23,23 @@ _SAYS = {
     ),
     "no-reward": f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
     "other-belief": (  # of a later component
-        "After {action} at {step:step} it expected {gap:number} {much:text} than before, mainly "
-        "because what it expects {component:when} went from {was:number} to {now:number}."
+        f"{_TURNED}, mainly because what is to come {{place:at}} went from {{was:number}} to "
+        "{now:number}."
     ),
     "spread-out": (  # half of what speaks for the outcome lies at a step or before
-        "After {action} at {step:step} it expected {gap:number} {much:text} than before, spread "
-        "over many steps: half of it {by:within}."
+        f"{_TURNED}, spread over many steps: half of it up to {{by:step}}."
     ),
     "put-off": (
-        "{action} at {step:step} delayed {worth:rewards}: they were to come {origin:when}, and now "
-        f"{{to:when}}; {_ALIKE}"
+        "{action} at {step:step} delayed {worth:rewards}: they were to come {origin:at}, and now "
+        f"{{to:at}}; {_ALIKE}"
     ),
     "brought-forward": (
-        "{action} at {step:step} brought {worth:rewards} forward: they were to come {origin:when}, "
-        f"and now {{to:when}}; {_ALIKE}"
+        "{action} at {step:step} brought {worth:rewards} forward: they were to come {origin:at}, "
+        f"and now {{to:at}}; {_ALIKE}"
     ),
     "exchanged": (
-        "{action} at {step:step} gained {gain:number} {up:when} and lost {loss:number} "
-        f"{{down:when}}; {_ALIKE}"
+        "{action} at {step:step} gained {gain:number} {up:at} and lost {loss:number} "
+        f"{{down:at}}; {_ALIKE}"
     ),
 }
 
@@ -70,7 +69,6 @@ def _turn(played: Played, row: int) -> Found:
     change = after - before
     total = float(change.sum())
     about |= {"gap": abs(total), "outcome": "better" if total > 0.0 else "worse"}
-    about |= {"much": "more" if total > 0.0 else "less"}
     directed = np.sign(total) * change  # what is above 0 speaks for the outcome
     if len(directed) == 1:
         return "turned-out", about
@@ -82,10 +80,11 @@ def _turn(played: Played, row: int) -> Found:
     if not directed[peak] >= FOCUS * speaks_for_it.sum():
         so_far = speaks_for_it.cumsum()
         half = int((so_far >= so_far[-1] / 2.0).argmax())
-        return "spread-out", about | {"by": (half + 1) * played.episode.time_axis.width - 1}
+        by = step + (half + 1) * played.episode.time_axis.width - 1
+        return "spread-out", about | {"by": by}
     was, now = float(before[peak]), float(after[peak])
     if peak > 0:
-        return "other-belief", about | {"component": peak, "was": was, "now": now}
+        return "other-belief", about | {"place": (step, peak), "was": was, "now": now}
     if now == 0.0:
         return "no-reward", about | {"expected": was}
     return "other-reward", about | {"expected": was, "reward": now}
@@ -95,16 +94,17 @@ def _shift(
     about: Fields, before: FloatArray, after: FloatArray, up: int, down: int, moved: float
 ) -> Found:
     """Returns what a step did that moved rewards, or costs, and left the total about the same."""
-    slack = NEARLY * moved
+    slack, step = NEARLY * moved, about["step"]
     if before[up] >= -slack and after[down] >= -slack:
         worth, origin, to = moved, down, up
     elif after[up] <= slack and before[down] <= slack:
         worth, origin, to = -moved, up, down
     else:
         gain, loss = float(after[up] - before[up]), float(before[down] - after[down])
-        return "exchanged", about | {"up": up, "gain": gain, "down": down, "loss": loss}
+        places = {"up": (step, up), "down": (step, down)}
+        return "exchanged", about | places | {"gain": gain, "loss": loss}
     kind = "put-off" if to > origin else "brought-forward"
-    return kind, about | {"worth": worth, "origin": origin, "to": to}
+    return kind, about | {"worth": worth, "origin": (step, origin), "to": (step, to)}
 
 
 def moved_between(change: FloatArray) -> tuple[int, int, float]:

@@ -170,8 +170,8 @@ def untested_difference(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "What comes {component:when} decides: {better} {better_sum:pays} then and {worse} "
-    "{worse_sum:pays}{averages:averages}."
+    "What comes {component:when} decides: {better} {better_sum:gains} then and {worse} "
+    "{worse_sum:gains}{averages:averages}."
 )
 def decided_at(choice: Choice) -> Iterator[Fields]:
     """Most of all that differs lies at one component, and speaks for the better action."""

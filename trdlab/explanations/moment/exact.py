@@ -145,7 +145,7 @@ def source_name(world: Gridworld, source: Source) -> str:
     >>> from trdlab.gridworld import load_map
     >>> world = Gridworld(load_map("drone"))
     >>> [source_name(world, source) for source in world.sources]
-    ['the coins', 'the treasure']
+    ['each coin', 'the treasure']
     """
     if source.kind == "step":
         return "a step"
@@ -153,7 +153,7 @@ def source_name(world: Gridworld, source: Source) -> str:
     count = sum(cell.kind == source.kind and cell.value == source.value for cell in cells)
     alike = {other for other in world.sources if other.kind == source.kind}
     worth = f" of {source.value:g}" if len(alike) > 1 else ""
-    return f"the {source.kind}{'s' * (count != 1)}{worth}"
+    return f"{'the' if count == 1 else 'each'} {source.kind}{worth}"
 
 
 class _Resolved:

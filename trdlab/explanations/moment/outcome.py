@@ -65,10 +65,10 @@ def _forms(trial: Trial) -> dict[str, Form]:
             return forms["when"].show(component, digits) + " "
         return "" if whole else forms["within"].show(axis.num_steps - 1, digits) + " "
 
-    def does(worth: str, pays: str) -> Form:
-        return Form(lambda component, _: worth if component is None and whole else pays)
+    def does(worth: str, gains: str) -> Form:
+        return Form(lambda component, _: worth if component is None and whole else gains)
 
-    is_worth = {"paid": does("was worth", "paid"), "pays": does("is worth", "pays")}
+    is_worth = {"gained": does("was worth", "gained"), "gains": does("is worth", "gains")}
     return forms | is_worth | {"at": Form(at)}
 
 
@@ -85,7 +85,7 @@ def tried(trial: Trial) -> Iterator[Fields]:
 
 # ---- whether what was forecast came --------------------------------------------------------------
 
-_MORE = "{component:at}{more} {component:paid} %s more than {less}"
+_MORE = "{component:at}{more} {component:gained} %s more than {less}"
 
 
 @TRIALS.kinds(
@@ -103,18 +103,18 @@ _MORE = "{component:at}{more} {component:paid} %s more than {less}"
         ),
         "against-the-forecast": (
             "The forecast was wrong: {more} was to be {said:number} ahead, but "
-            "{component:at}{less} {component:paid} {ahead:estimate} more."
+            "{component:at}{less} {component:gained} {ahead:estimate} more."
         ),
         "no-difference": (
-            "The forecast was wrong: {component:at}{more} {component:paid} the same as {less}, "
+            "The forecast was wrong: {component:at}{more} {component:gained} the same as {less}, "
             "though {said:number} more was forecast."
         ),
         "too-few-tries": (
             "{copies:count} tries of each are too few to tell whether {component:at}{more} "
-            "{component:pays} more than {less}; about {enough:count} would do."
+            "{component:gains} more than {less}; about {enough:count} would do."
         ),
         "too-close-to-tell": (
-            "Tries cannot tell whether {component:at}{more} {component:pays} more than {less}: "
+            "Tries cannot tell whether {component:at}{more} {component:gains} more than {less}: "
             "they are too close."
         ),
     }

@@ -33,7 +33,7 @@ def regular(choice: Choice, named: Collection[int] = ()) -> list[Claim]:
     return (every(choice, rhythm) or single) + every(choice, spread)
 
 
-@CHOICES.rule("With {action}, each of {count:first} {mean:pays}{average:average}.")
+@CHOICES.rule("With {action}, each of {count:first} {mean:pays} ({about:text}not discounted).")
 def steady(choice: Choice) -> Iterator[Fields]:
     """Each of three or more steps is within `ALIKE` of their mean; w = 1."""
     row = undiscounted(choice.moment, choice.action)
@@ -45,7 +45,8 @@ def steady(choice: Choice) -> Iterator[Fields]:
             choice.moment.is_sure(choice.action)
             and np.ptp(shares(choice.moment, choice.action)) == 0.0
         )
-        fields = {"count": len(row), "action": choice.action, "average": is_same}
+        about = "" if is_same else "more or less, "
+        fields = {"count": len(row), "action": choice.action, "about": about}
         yield fields | {"mean": float(row[0]) if is_same else mean}
 
 

@@ -143,11 +143,11 @@ def flips(choice: Choice) -> Iterator[Fields]:
 @CHOICES.kinds(
     {
         "never-flips": (
-            "Whatever value was tried for {quantity:text}, {better} is better than {worse}."
+            "Whatever {quantity:text} {did:text}, within the values tried, {better} is better "
+            "than {worse}."
         ),
         "several-flips": (
-            "Altogether, which of the two is better changes at these values of {quantity:text}: "
-            "{at:roots}."
+            "The preference changes sides at each of these values of {quantity:text}: {at:names}."
         ),
     }
 )
@@ -155,9 +155,11 @@ def in_all(choice: Choice) -> Iterator[Found]:
     """Quantities that never flip it, or more often than at the nearest values."""
     for of, better, worse, roots in _found(choice):
         if not roots:
-            yield "never-flips", {"quantity": of.name, "worse": worse, "better": better}
+            fields = {"quantity": of.name, "did": of.verb("was", "paid", "cost")}
+            yield "never-flips", fields | {"worse": worse, "better": better}
         elif len(roots) > 1:
-            at = tuple(abs(root) for root in roots)
+            sizes = [abs(root) for root in roots]
+            at = tuple(said(size, digits_to_tell(sizes)) for size in sizes)
             yield "several-flips", {"quantity": of.name, "at": at}
 
 

@@ -11,7 +11,7 @@ _TOLD = ("first-reward", "first-expected")
 
 
 @CHOICES.rule(
-    "With {action} as with {foil}, the first {effect:text}{expected:text} comes {component:when}."
+    "With both {action} and {foil}, the first {effect:text}{expected:text} comes {component:when}."
 )
 def first_together(choice: Choice) -> Iterator[Fields]:
     """Nothing that stands out comes before it; how much it is may differ."""

@@ -68,10 +68,10 @@ def test_each_surprise_has_its_reason():
         place(claim): claim.sentence for claim in tell(changed).moments if "gap" in claim.fields
     }
     assert turns == {
-        0: "After wait at step 0 it expected 0.125 more than before, mainly because what it "
-        "expects after the first 4 steps went from 0 to 0.125.",
-        1: "After wait at step 1 it expected 0.25 less than before, mainly because what it "
-        "expects 3 steps later went from 0.25 to 0.",
+        0: "Wait at step 0 turned out 0.125 better than expected, mainly because what is to come "
+        "after step 3 went from 0 to 0.125.",
+        1: "Wait at step 1 turned out 0.25 worse than expected, mainly because what is to come at "
+        "step 4 went from 0.25 to 0.",
     }
     more = played(foretold([0.0, 0.5]), [0.0, 2.0])
     assert said(tell(more).moments) == [
@@ -94,7 +94,7 @@ def test_a_cost_is_not_called_a_reward():
     hurt = played(foretold([0.0, -0.5]), [0.0, -2.0])
     assert "mainly because a cost of 2 came" in said(tell(hurt).moments)[0]
     assert said(tell(hurt).start) == [
-        "At the start the agent expected costs worth 0.25, the largest part 1 step later."
+        "At the start the agent expected costs worth 0.25, most of it 1 step later."
     ]
 
 
@@ -106,8 +106,8 @@ def test_a_reward_that_comes_at_another_step_is_one_of_timing():
     rows[3] = [1.0, 0.0, 0.0, 0.0, 0.0]
     late = played(rows, [0.0, 0.0, 0.0, 1.0])
     assert tell(late).moments[0].sentence == (
-        "Wait at step 1 delayed rewards worth 0.25: they were to come at once, and now 2 steps "
-        "later; all together it expects about the same."
+        "Wait at step 1 delayed rewards worth 0.25: they were to come at step 1, and now at "
+        "step 3; in all, it expects about as much as before."
     )
     costly = played(-rows, [0.0, 0.0, 0.0, -1.0])
     assert "delayed costs worth 0.25" in tell(costly).moments[0].sentence
@@ -140,16 +140,16 @@ def test_where_nothing_surprises_nothing_is_made_of_it():
 
 def test_what_came_is_held_against_what_was_expected_only_where_it_is_known():
     rows, rewards = foretold([1.0, 1.0]), [1.0, 3.0]
-    other = "Counted from the start it came to 2.5; the agent had expected 1.5."
+    other = "What came was worth 2.5 at the start; the agent had expected 1.5."
     assert tell(played(rows, rewards)).end[-1].sentence == other
-    same = "Counted from the start it came to 1.5, as the agent had expected."
+    same = "What came was worth 1.5 at the start, as the agent had expected."
     assert tell(played(rows, [1.0, 1.0])).end[-1].sentence == same
     assert tell(played(rows, rewards, terminated=False)).end[-1].kind == "cut-off"
     ends = np.array([True, True])
     lost = played(rows, rewards, life_lost=np.array([True, False]), ends=ends)
     assert tell(lost).end[-1].sentence == (
-        "Counted from the start it came to 1 up to step 0, where a life was "
-        "lost; the agent had expected 1.5."
+        "What came was worth 1 at the start (up to step 0, where a life was lost); the agent had "
+        "expected 1.5."
     )
 
 

@@ -89,7 +89,7 @@ def test_to_fall_off_a_cliff_is_no_bump():
     (decided,) = of_kind(of, "decided-at")
     assert decided.component == 0
     assert (
-        decided.sentence == "What comes at once decides: up pays nothing then and right costs 100."
+        decided.sentence == "What comes at once decides: up gains nothing then and right loses 100."
     )
 
 
@@ -190,12 +190,12 @@ def pair(a: list[float], b: list[float], **known: Any) -> Choice:
         (
             [0] * 9 + [2, 0],
             [0] * 11,
-            "What comes 9 steps later decides: a pays 2 then and b pays nothing, on average.",
+            "What comes 9 steps later decides: a gains 2 then and b gains nothing, on average.",
         ),
         (
             [0] * 9 + [1, 1, 0, 0],
             [0] * 12 + [3],
-            "In the first 11 steps a gains 2 and b gains nothing, on average.",
+            "In the first 12 steps a gains 2 and b gains nothing, on average.",
         ),
         (
             [-0.5, 2, 0, 0, 0],

@@ -102,10 +102,10 @@ def test_a_reward_that_hardly_varies_has_no_peak_and_is_called_the_same():
     said = told(learned(1.0 + np.clip(noise(0, 0.01), -0.02, 0.02)))
     (first, *_) = said.values()
     assert first.startswith("With go, each of the first 40 steps pays ")
-    assert first.endswith(" on average.")
+    assert first.endswith(" (more or less, not discounted).")
     assert not {"peak", "several-peaks", "rhythm", "spread"} & set(said)
     assert told(learned(-np.ones(11)))["steady"] == (
-        "With go, each of the first 10 steps costs 1 on average."
+        "With go, each of the first 10 steps costs 1 (more or less, not discounted)."
     )
     assert "steady" not in told(learned(1.0 + 0.2 * STEPS / 40.0))
 

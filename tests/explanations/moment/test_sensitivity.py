@@ -62,7 +62,7 @@ def test_polynomials_flip_at_their_roots(places: list[int], shift: float, sign: 
 
 def test_treasure_4_never_flips_over_gamma_and_treasure_5_flips_once():
     assert said(choice(), "never-flips") == [
-        "Whatever value was tried for γ, down is better than up."
+        "Whatever γ was, within the values tried, down is better than up."
     ]
     richer = choice(Gridworld(load_map("drone").with_value("treasure", 5)))
     flip = next(claim for claim in of_kind(richer, "flips") if claim.quantity == "γ")
@@ -96,7 +96,7 @@ def test_what_lies_between_two_flips_is_said_to():
     of = replace(known, what_ifs=(dip,)).choice("a", "b")
     assert said(of, "flips") == ["B would be better if γ were between 0.2 and 0.6 instead of 0.9."]
     assert said(of, "several-flips") == [
-        "The better one of the two changes at each of these values of γ: 0.20000 and 0.60000."
+        "The preference changes sides at each of these values of γ: 0.2 and 0.6."
     ]
     cost = WhatIf("the hazards", -4.0, -40.0, 0.0, lambda x: np.array([-1.0 - x, 0.0]))
     of = replace(known, what_ifs=(cost,)).choice("a", "b")

@@ -12,7 +12,7 @@ FOCUS = 1 / 3  # of a surprise: what one component must account for, to be named
 NEARLY = 1 / 4  # of what moved from one step to another: how far signs may be mixed there
 
 _TURNED = "{action} at {step:step} turned out {gap:number} {outcome:text} than expected"
-_ALIKE = "all together it expects about the same."
+_ALIKE = "in all, it expects about as much as before."
 _SAYS = {
     "turned-out": f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
     "ended-early": (  # the future ended, which changed more than the reward did

@@ -13,7 +13,6 @@ from trdlab.explanations.rules import Fields
 NOISE = 0.1  # of the largest lead: up to this one of what was learned may be noise
 _SEEN = 1e-3  # of a sum: a cost that changes it as it is printed
 _SOON = 4, 0.2  # immediate are so many steps, or such a share of the explicit ones
-_LASTS = 0.5  # of a lead: if so much is left of it where it ends, it is told there
 _MOST_CROSSINGS = 2  # of more only the last is told
 
 
@@ -54,11 +53,11 @@ def sums(choice: Choice, leader: str, other: str, count: int) -> Fields:
 def leads_of(choice: Choice) -> Iterator[Fields]:
     """Yields which action is the first to lead clearly, and where it is furthest ahead.
 
-    A lead that begins soon is told as it stands soon, and another as it ends, if most is left.
+    A lead that begins soon is told as it stands soon.
     """
     axis, soon = choice.time_axis, _soon(choice)
     for leader, other in choice.orders:
-        lead = choice.moment.lead(leader, other)[:-1]  # [N]
+        lead, in_the_end = np.split(choice.moment.lead(leader, other), [-1])  # [N], [1]
         lead[np.abs(lead) < _least_lead(choice.moment, leader, other)] = 0.0
         places = np.flatnonzero(lead)
         if not places.size or lead[places[0]] < 0:
@@ -69,8 +68,8 @@ def leads_of(choice: Choice) -> Iterator[Fields]:
         if soon > begins and lead[:soon].max() >= SHARE * lead[:until].max():
             until = min(until, soon)
         count = int(lead[:until].argmax()) + 1
-        if count > soon and lead[until - 1] >= _LASTS * lead[count - 1]:
-            count = until
+        if count > soon and until == axis.horizon and in_the_end < 0.0:
+            count = until  # it is told as it stands before what decides otherwise
         yield sums(choice, leader, other, count) | {"last_step": count * axis.width - 1}
 
 

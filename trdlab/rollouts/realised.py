@@ -34,15 +34,10 @@ class Samples:
     def __len__(self) -> int:
         return len(self.predicted)
 
-    def per_episode(self, values: FloatArray) -> FloatArray:
-        """Returns `[E, ...]`: the sums of `values [M, ...]` over each episode."""
-        return per_episode(values, self.episode, self.num_episodes)
-
-
-def per_episode(values: FloatArray, episode: IntArray, num_episodes: int) -> FloatArray:
-    """Returns `[E, ...]`: the sums of `values [M, ...]` by `episode [M]`, which is in order."""
-    bounds = np.searchsorted(episode, np.arange(1, num_episodes))
-    return np.stack([part.sum(axis=0) for part in np.split(values, bounds)])
+    def per_episode(self, values: FloatArray, every: int = 1) -> FloatArray:
+        """Returns `[E, ...]`: the sums by episode of `values [M/every, ...]`, of one in `every`."""
+        bounds = np.searchsorted(self.episode[::every], np.arange(1, self.num_episodes))
+        return np.stack([part.sum(axis=0) for part in np.split(values, bounds)])
 
 
 def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from trdlab.arrays import FloatArray, same
+from trdlab.arrays import FloatArray, difference
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.formatting import amount, decimals_for, decimals_to_tell, number
 
@@ -52,7 +52,8 @@ def action_table(choice: Choice) -> Table | None:
     ]
     styles = {name: "dim" for name in moment.action_names if name not in (action, foil)}
     if foil is not None:
-        gap, q_gap = moment.difference(action, foil), _gap(moment, action, foil)
+        gap = moment.difference(action, foil)
+        q_gap = float(difference(moment.q_value(action), moment.q_value(foil)))
         total = moment.total(action) - moment.total(foil)
         decimals = max(decimals, decimals_for(gap), decimals_for([q_gap]))
         name = f"{action} − {foil}"
@@ -61,11 +62,6 @@ def action_table(choice: Choice) -> Table | None:
     heading = ("action", *axis.labels, "Q", *["total"] * has_totals, "")
     sides = "<" + ">" * len(heading[2:]) + "<"
     return Table(heading, tuple(rows), sides, styles, axis.num_components)
-
-
-def _gap(moment: Moment, action: str, foil: str) -> float:
-    a, b = moment.q_value(action), moment.q_value(foil)
-    return 0.0 if same(a, b) else a - b
 
 
 def _notes(moment: Moment) -> list[str]:

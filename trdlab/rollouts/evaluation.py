@@ -1,7 +1,7 @@
 """How well an agent plays: whole episodes, and the returns that the environment pays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -54,10 +54,7 @@ class Evaluation:
             "epsilon": self.epsilon,
             "seed": self.seed,
             "max_steps": self.max_steps,
-            **{
-                name: {"value": of.value, "low": of.low, "high": of.high, "level": 0.95}
-                for name, of in means.items()
-            },
+            **{name: {**asdict(of), "level": 0.95} for name, of in means.items()},
             "returns": self.returns.tolist(),
             "lengths": self.lengths.tolist(),
             "truncated": self.truncated.tolist(),

@@ -55,17 +55,15 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
     """
     axis, total, far = episode.time_axis, len(episode), np.iinfo(np.int64).max
     steps, starts = np.arange(axis.num_steps), np.arange(total)
-    end = next_flag(episode.ends, far)[:total]  # [T], the step after which nothing comes
-    observed = np.zeros((total, axis.num_components))
-    padded = np.concatenate([episode.rewards, np.zeros(axis.num_steps)])
-    if axis.horizon:
-        windows = np.lib.stride_tricks.sliding_window_view(padded, axis.num_steps)[:total]
-        alive = starts[:, None] + steps <= end[:, None]  # [T, N·w]
-        rewards = np.where(alive, windows, 0.0) * axis.gamma**steps
-        observed[:, :-1] = rewards.reshape(total, axis.horizon, axis.width).sum(axis=2)
-    later = np.concatenate([_returns(episode, axis.gamma), np.zeros(axis.num_steps)])
-    residual = later[starts + axis.num_steps] * axis.gamma**axis.num_steps
-    observed[:, -1] = np.where(starts + axis.num_steps <= end, residual, 0.0)
+    end = next_flag(episode.ends, far)  # [T], the step after which nothing comes
+    padded = np.append(episode.rewards, np.zeros(axis.num_steps))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, axis.num_steps)[:total]
+    alive = starts[:, None] + steps <= end[:, None]  # [T, N·w]
+    rewards = np.where(alive, windows, 0.0) * axis.gamma**steps
+    explicit = rewards.reshape(total, axis.horizon, axis.width).sum(axis=2)
+    later = np.append(_returns(episode, axis.gamma), np.zeros(axis.num_steps))[axis.num_steps :]
+    residual = np.where(starts + axis.num_steps <= end, later * axis.gamma**axis.num_steps, 0.0)
+    observed = np.column_stack([explicit, residual])
 
     beyond = starts[:, None] + axis.width * np.arange(1, axis.num_components)  # [T, N], its end
     known = (end[:, None] < far) | (beyond <= total)
@@ -73,8 +71,7 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
         known &= beyond <= episode.time_limit
     random = np.append(episode.random, False)
     known &= beyond <= next_flag(random, far)[1 : total + 1, None]
-    known_residual = (end < far) & (episode.epsilon == 0.0)
-    known = np.concatenate([known, known_residual[:, None]], axis=1)
+    known = np.column_stack([known, (end < far) & (episode.epsilon == 0.0)])
     return np.where(known, observed, 0.0), known
 
 

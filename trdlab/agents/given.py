@@ -71,7 +71,7 @@ def _moved(agent: Agent, place: Place) -> Agent:
 
 def _model_around(table: ExactTable, env: Any) -> Model:
     """Returns the model of a table, in the words of an environment that is the same model."""
-    found = None if isinstance(env, str) else model_of(env)
+    found = model_of(env)
     if found is None or found.world.mdp.shape != table.mdp.shape:
         found = model_of(table.mdp)
     assert found is not None  # a model is one

@@ -32,12 +32,7 @@ def exact_agent(
 ) -> Agent:
     """Returns the exact table of a model with a name as an agent that acts optimally in it.
 
-    Args:
-        name: `gridworld:NAME`, `gridworld:FILE` or `tabular:ENV_ID`, and after commas what to make
-            it with, such as `gridworld:ledge,slip=0.2`.
-        time_axis: γ, N and w.
-        env: an environment to act in instead, with the same states (see `find_place`).
-        env_arguments: what to make that one with, as `KEY=VALUE`.
+    The name, and another environment to act in, are given as to `find_agent`.
 
     Raises:
         InputError: the model cannot be made, or the other environment does not fit.

@@ -19,16 +19,14 @@ from trdlab.estimator import Estimator
 from trdlab.tabular import ExactTable
 from trdlab.time_axis import TimeAxis
 
-_NEEDED = ("decompose", "time_axis", "future")
-
 
 def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:
-    """Returns the agent that an object is, or that can be made of it.
+    """Returns the agent that an object is, or that can be made of it, where it acts in `env`.
 
     Args:
         what: an agent, a model, a table, or another estimator.
-        env: where it acts (see `find_place`); None where it was made for, if it was made for one.
-        env_arguments: what to make that with, as `KEY=VALUE`.
+        env: see `find_place`; None where it was made for, if it was made for one.
+        env_arguments: likewise.
         axis: γ, N and w of a model that has to be solved.
 
     Raises:
@@ -47,7 +45,7 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
         )
     if (model := model_of(what)) is not None:
         return model_agent(model, axis, place=place)
-    missing = [name for name in _NEEDED if not hasattr(what, name)]
+    missing = [name for name in ("decompose", "time_axis", "future") if not hasattr(what, name)]
     if missing:
         raise InputError(
             f"This {type(what).__name__} is no agent: it has no {' and no '.join(missing)}.",

@@ -137,13 +137,12 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
         return Place(make, called, is_named=named, mdp=model.world.mdp)
     source: Any = env
     arguments = parse_arguments(env_arguments)
-    return Place(
-        lambda count, seed: GymEnvironments(source, count, seed=seed, env_arguments=arguments),
-        str(env) if named else "the environment",
-        tuple(env_arguments),
-        named,
-        _mdp_of(env),
-    )
+
+    def made(num_envs: int, seed: int) -> GymEnvironments:
+        return GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments)
+
+    called = str(env) if named else "the environment"
+    return Place(made, called, tuple(env_arguments), named, _mdp_of(env))
 
 
 def _mdp_of(env: Any) -> MDP | None:

@@ -27,13 +27,9 @@ def run_agent(
     env: Where | None = None,
     env_arguments: Sequence[str] = (),
 ) -> Agent:
-    """Returns the agent of a run, with the environments it was trained in or others that fit.
+    """Returns the agent of a run, or of its checkpoint at an older agent step.
 
-    Args:
-        path: the run's folder.
-        step: of an older checkpoint, in agent steps.
-        env: another environment to act in (see `find_place`).
-        env_arguments: what to make that one with, as `KEY=VALUE`.
+    It acts in the environments it was trained in, or in others that fit (see `find_agent`).
 
     Raises:
         InputError: there is no run or no such checkpoint, or the environment does not fit.

@@ -13,7 +13,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
 from trdlab.policies import Policy
 from trdlab.rollouts.playing import Playing, Watch, unwatched
-from trdlab.rollouts.realised import Samples, all_or_none
+from trdlab.rollouts.realised import Samples
 
 
 class TooFewMoments(InputError):  # noqa: N818  it says what episodes are, not what failed
@@ -209,13 +209,13 @@ def _followed(
 
 
 def _joined(found: list[Branches]) -> Branches:
-    """Returns the moments of all times, in the order of their episodes."""
+    """Returns the moments of all times, in the order of their episodes; what is known as `pool`."""
     order = np.argsort(np.concatenate([part.episode for part in found]), kind="stable")
     names = ("predicted", "observed", "known", "episode", "actions")
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in found])[order] for name in names
     }
-    arrays["known"] = all_or_none(arrays["known"])
+    arrays["known"][:, -1] &= arrays["known"][:, -1].all()
     arrays["observed"] = np.where(arrays["known"], arrays["observed"], 0.0)
     return replace(found[0], **arrays)
 

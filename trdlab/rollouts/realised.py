@@ -85,22 +85,16 @@ def pool(episodes: Sequence[Episode]) -> Samples:
         InputError: there are no episodes, or they are of different time axes.
     """
     time_axis = common_axis(episodes)
-    observed, known = zip(*map(what_followed, episodes), strict=True)
+    observed, known = map(np.concatenate, zip(*map(what_followed, episodes), strict=True))
+    known[:, -1] &= known[:, -1].all()
     return Samples(
         time_axis=time_axis,
         predicted=np.concatenate([episode.predicted for episode in episodes]).astype(np.float64),
-        observed=np.concatenate(observed),
-        known=all_or_none(np.concatenate(known)),
+        observed=observed,
+        known=known,
         episode=np.repeat(np.arange(len(episodes)), [len(episode) for episode in episodes]),
         num_episodes=len(episodes),
     )
-
-
-def all_or_none(known: BoolArray) -> BoolArray:
-    """Returns what is known `[M, N+1]`, of the residual only if it is known of all M."""
-    known = known.copy()
-    known[:, -1] = known[:, -1].all()
-    return known
 
 
 def common_axis(episodes: Sequence[Episode]) -> TimeAxis:

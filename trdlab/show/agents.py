@@ -32,11 +32,13 @@ def _(explanation: Explanation) -> Document:
     heading = [agent.name]
     if choice is not None or explanation.story is not None:
         heading.append(seed if choice is None else f"step {explanation.step} of {seed}")
+    if choice is not None and explanation.parts and "contrast" not in explanation.parts:
+        choice = replace(choice, foil=None)  # their difference is told to who asks for a contrast
     return Document(
         heading=" · ".join(heading),
         setting=(*axis_words(explanation.time_axis), *_played(explanation)),
         scene=None if state is None or agent.world is None else scene_of(agent.world, state),
-        table=_shown(explanation),
+        table=None if choice is None else action_table(choice),
         answer=tuple(claim.sentence for claim in explanation.answer),
         sections=explanation.sections,
         folded=not explanation.parts,
@@ -63,14 +65,6 @@ def _(comparison: Comparison) -> Document:
         answer=tuple(claim.sentence for claim in comparing.in_brief(comparison)),
         sections=comparing.sections(comparison),
     )
-
-
-def _shown(explanation: Explanation) -> Table | None:
-    """Returns the actions shown; the difference of two only to who asks for a contrast."""
-    choice, parts = explanation.choice, explanation.parts
-    if choice is None:
-        return None
-    return action_table(choice if not parts or "contrast" in parts else replace(choice, foil=None))
 
 
 def _played(explanation: Explanation) -> list[str]:

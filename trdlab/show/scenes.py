@@ -48,6 +48,7 @@ def scene_of(world: Gridworld | TabularWorld, state: int) -> Scene:
 
 def _on_map(world: Gridworld, state: int) -> Scene:
     grid, here = world.grid, world.states[state]
+    collected = sorted(map(list, here.collected))
     rules = [f"slip {plain(grid.slip)}"] * bool(grid.slip)
     rules += [f"each step costs {plain(grid.step_cost)}"] * bool(grid.step_cost)
     told = {name: getattr(grid, name) for name in ("name", "title", "rows", "slip", "step_cost")}
@@ -60,11 +61,7 @@ def _on_map(world: Gridworld, state: int) -> Scene:
         legend=legend(world),
         notes=(),
         world={"schema": "trdlab.gridworld/2", "map": {**told, "num_states": len(world.states)}},
-        state={
-            "row": here.row,
-            "column": here.column,
-            "collected": sorted(map(list, here.collected)),
-        },
+        state={"row": here.row, "column": here.column, "collected": collected},
     )
 
 
@@ -101,6 +98,4 @@ def _in_table(world: TabularWorld, state: int) -> Scene:
 
 
 def _is_plain(value: Any) -> bool:
-    return isinstance(value, bool | int | str) or (
-        isinstance(value, float) and math.isfinite(value)
-    )
+    return isinstance(value, int | str) or (isinstance(value, float) and math.isfinite(value))

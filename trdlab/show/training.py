@@ -72,13 +72,14 @@ def runs_page(runs: Sequence[RunSummary], *, width: int | None = None) -> Text:
 
 def _row(run: RunSummary) -> tuple[Row, str]:
     """Returns the cells of a run, and what is wrong with it, if anything is."""
-    name, fault = run.path.name, run.fault
+    name = run.path.name
+    unreadable = (name, "", "", "", "", "", "cannot be read")
+    if run.fault:
+        return unreadable, run.fault
     try:
-        settings = None if fault else TrainSettings.from_config(run.config, "Its config.toml")
+        settings = TrainSettings.from_config(run.config, "Its config.toml")
     except InputError as error:
-        settings, fault = None, str(error)
-    if settings is None:
-        return (name, "", "", "", "", "", "cannot be read"), fault or ""
+        return unreadable, str(error)
     score = run.metrics.get("score")
     steps = max(run.step or 0, run.metrics.get("agent_steps", 0))
     told = "" if score is None else _number(score, _decimals(score))

@@ -25,9 +25,9 @@ class Scene:
         rules: what else decides the numbers, such as a slip probability.
         drawing: the map as text, empty where there is none.
         legend: what its symbols mean.
-        notes: what the numbers leave out.
         world: what JSON says of the world, and in which schema.
         state: what it says of the state, besides its index.
+        notes: what the numbers leave out.
     """
 
     heading: str
@@ -36,9 +36,9 @@ class Scene:
     rules: tuple[str, ...]
     drawing: str
     legend: tuple[str, ...]
-    notes: tuple[str, ...]
     world: dict[str, Any]
     state: dict[str, Any]
+    notes: tuple[str, ...] = ()
 
 
 def scene_of(world: Gridworld | TabularWorld, state: int) -> Scene:
@@ -59,7 +59,6 @@ def _on_map(world: Gridworld, state: int) -> Scene:
         rules=tuple(rules),
         drawing=ansi(world, state),
         legend=legend(world),
-        notes=(),
         world={"schema": "trdlab.gridworld/2", "map": {**told, "num_states": len(world.states)}},
         state={"row": here.row, "column": here.column, "collected": collected},
     )

@@ -44,11 +44,12 @@ def action_table(choice: Choice) -> Table | None:
         values = (number(float(value), of) for value in (*components, q))
         return (name, *values, *[amount(total)] * has_totals, note)
 
+    notes = [_note(moment, i) for i in range(len(moment.action_names))]
     values = moment.decomposition.components.ravel()
     decimals = max(decimals_for(values), decimals_to_tell(moment.q_values))
     rows = [
         row(name, moment.components(name), moment.q_value(name), moment.total(name), note, decimals)
-        for name, note in zip(moment.action_names, _notes(moment), strict=True)
+        for name, note in zip(moment.action_names, notes, strict=True)
     ]
     styles = {name: "dim" for name in moment.action_names if name not in (action, foil)}
     if foil is not None:
@@ -64,16 +65,10 @@ def action_table(choice: Choice) -> Table | None:
     return Table(heading, tuple(rows), sides, styles, axis.num_components)
 
 
-def _notes(moment: Moment) -> list[str]:
-    """Returns what stands beside each action: how likely it is chosen, or that it goes nowhere."""
-    nothing = [0.0] * len(moment.action_names)
-    chances = nothing if moment.policy is None else moment.policy.tolist()
-    return [
-        _note(chance, stays) for chance, stays in zip(chances, moment.stays or nothing, strict=True)
-    ]
-
-
-def _note(chance: float, stays: float) -> str:
+def _note(moment: Moment, i: int) -> str:
+    """Returns what stands beside an action: how likely it is chosen, or that it goes nowhere."""
+    chance = 0.0 if moment.policy is None else float(moment.policy[i])
+    stays = moment.stays[i] if moment.stays else 0.0
     if chance > 0.0:
         return "chosen" if chance > 0.9995 else f"chosen {100 * chance:.0f} %"
     return "stays here" if stays >= 1.0 - 1e-9 else "mostly stays" if stays > 0.5 else ""

@@ -52,11 +52,9 @@ def evaluation_page(evaluation: Evaluation, *, width: int | None = None) -> Text
 
 def _cut_off(evaluation: Evaluation) -> str:
     """Returns how many episodes were cut off, and after how many steps where all were alike."""
-    cut, limit = int(evaluation.truncated.sum()), evaluation.max_steps
-    told = f"{cut} of {len(evaluation.lengths)} were cut off"
-    if not cut or limit is None or (evaluation.lengths[evaluation.truncated] != limit).any():
-        return told if cut else ""
-    return f"{told} at step {limit:,}"
+    cut, limit = evaluation.lengths[evaluation.truncated], evaluation.max_steps
+    at = f" at step {limit:,}" if limit is not None and (cut == limit).all() else ""
+    return f"{len(cut)} of {len(evaluation.lengths)} were cut off{at}" if len(cut) else ""
 
 
 def runs_page(runs: Sequence[RunSummary], *, width: int | None = None) -> Text:

@@ -191,25 +191,22 @@ class Branching:
 
 def _followed(
     branch: Playing, actions: IntArray, length: int, future: Future
-) -> tuple[FloatArray, IntArray]:
-    """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, the ends.
-
-    An end is the number of steps until nothing is left to come; −1 where none was seen.
-    """
-    rewards, ended = np.zeros((len(actions), length)), np.full(len(actions), -1)
+) -> tuple[FloatArray, BoolArray]:
+    """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, what ended."""
+    rewards, ended = np.zeros((len(actions), length)), np.zeros(len(actions), dtype=np.bool_)
     while branch.running.any():
         running, t = branch.running, branch.steps
         step = branch.take(branch.turn().actions if t else actions)
         rewards[running, t] = future.count(step.rewards)[running]
         end = running & future.ends(step.terminated, step.truncated, step.life_lost)
-        ended[end] = t + 1
+        ended |= end
         rewards[running & step.truncated & ~end, t + 1 :] = np.nan
         branch.running = branch.running & ~end
     return rewards, ended
 
 
 def _joined(found: list[Branches]) -> Branches:
-    """Returns the moments of all times, in the order of their episodes; what is known as `pool`."""
+    """Returns the moments of all times by episode; a residual is known of all of them or none."""
     order = np.argsort(np.concatenate([part.episode for part in found]), kind="stable")
     names = ("predicted", "observed", "known", "episode", "actions")
     arrays: dict[str, Any] = {
@@ -228,7 +225,7 @@ def _others(actions: IntArray, num_actions: int, rng: np.random.Generator) -> In
 
 
 def _on_axis(
-    axis: TimeAxis, rewards: FloatArray, ended: IntArray, time_limit: int | None, age: int
+    axis: TimeAxis, rewards: FloatArray, ended: BoolArray, time_limit: int | None, age: int
 ) -> tuple[FloatArray, BoolArray]:
     """Returns `[B, N+1]` twice: the components of `rewards [B, steps]`, and which are known.
 
@@ -240,7 +237,7 @@ def _on_axis(
     residual = discounted[:, axis.num_steps :].sum(axis=1)
     observed = np.column_stack([explicit.sum(axis=2), residual])  # [B, N+1]
     known = ~np.isnan(observed)
-    known[:, -1] &= ended >= 0
+    known[:, -1] &= ended
     if time_limit is not None:
         beyond = age + axis.width * np.arange(1, axis.num_components)
         known[:, :-1] &= beyond <= time_limit

@@ -180,7 +180,7 @@ class Playing:
         self.steps += 1
         over = step.ended | (self.steps == self.max_steps)  # [B]
         self.finished, self.running = self.running & over, self.running & ~over
-        self.stack.push(step.frames, np.zeros_like(over))
+        self.stack.push(step.frames, np.zeros_like(over))  # where episodes end, their last ones
         self._last = self.stack.observations[self.finished]
         self.stack.begin(step.following, step.ended)
         self._decision, self._turn = None, None

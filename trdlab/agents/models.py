@@ -26,7 +26,6 @@ World = Gridworld | TabularWorld
 
 _ANYWHERE = "exploring_starts"
 _OF_GRIDWORLDS = ("slip", "treasure", _ANYWHERE)  # of `GridworldEnv`, what shapes its episodes
-_LEAST_STEPS, _MOST_STEPS = 100, 2_000  # of a time limit where a model has none
 _LONG = 60  # letters of a name in a message
 
 
@@ -137,5 +136,5 @@ def _usual_limit(world: World) -> int:
     """Returns the steps after which episodes are cut off where a model has no limit."""
     if isinstance(world, Gridworld):
         rows, columns = world.grid.shape
-        return max(_LEAST_STEPS, 4 * rows * columns)
-    return min(max(_LEAST_STEPS, 4 * world.mdp.num_states), _MOST_STEPS)
+        return max(100, 4 * rows * columns)
+    return min(max(100, 4 * world.mdp.num_states), 2_000)

@@ -15,7 +15,6 @@ from trdlab.runs.checkpoint import checkpoint_steps
 from trdlab.runs.folder import RunFolder
 from trdlab.tabular.toytext import toy_text_ids
 
-_DIGITS = 19  # more are no number of steps
 _OWN_AXIS = "is a run with its own γ, N and w."
 _LEAVE_OUT = "Leave out `gamma`, `horizon` and `width`."
 
@@ -76,7 +75,7 @@ def _checkpoint(name: str) -> tuple[Path, int | None]:
     folder, at, step = name.rpartition("@")
     if not at or not folder or Path(name).exists():
         return Path(name), None
-    if step.isdecimal() and len(step) < _DIGITS:
+    if step.isdecimal() and len(step) < 19:  # more digits are no number of steps
         return Path(folder), int(step)
     steps = checkpoint_steps(RunFolder.open(Path(folder)))
     raise InputError(

@@ -69,11 +69,8 @@ def _moved(agent: Agent, place: Place) -> Agent:
 
 def _model_around(table: ExactTable, env: Any) -> Model:
     """Returns the model of a table, in the words of an environment that is the same model."""
-    found = model_of(env)
-    if found is None or found.world.mdp.shape != table.mdp.shape:
-        found = model_of(table.mdp)
-    assert found is not None  # a model is one
-    return found
+    models = filter(None, (model_of(env), model_of(table.mdp)))  # the latter always fits
+    return next(model for model in models if model.world.mdp.shape == table.mdp.shape)
 
 
 def _estimating(estimator: Estimator, place: Place) -> Agent:

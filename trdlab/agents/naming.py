@@ -109,9 +109,7 @@ def find_pair(
         raise InputError(f"Each of the two {_OWN_AXIS}", _LEAVE_OUT)
     found, axis = {}, changed(AXIS, *given)
     for name in sorted(names, key=is_model):  # runs first
-        if is_model(name):
-            found[name] = find_agent(name, **asdict(axis), **where)
-        else:
-            found[name] = find_agent(name, **where)
-            axis = changed(found[name].estimator.time_axis, *given)
+        own = asdict(axis) if is_model(name) else {}
+        found[name] = find_agent(name, **own, **where)
+        axis = changed(found[name].estimator.time_axis, *given)
     return found[names[0]], found[names[1]]

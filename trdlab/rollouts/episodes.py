@@ -144,8 +144,8 @@ class Recording:
         running, decision, turn = playing.running, playing.decide(), playing.turn()
         step = playing.take(turn.actions)
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
-        rewards, how = future.count(step.rewards), (step.life_lost, ends, step.terminated)
-        happened = (turn.actions, rewards, *how, turn.random)
+        told = (step.life_lost, ends, step.terminated, turn.random)
+        happened = (turn.actions, future.count(step.rewards), *told)
         seen = zip(decision.decomposition.components, decision.expected, strict=True)
         for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
             self._logs[env].append((*expectations, *(part[env] for part in happened)))

@@ -69,14 +69,13 @@ def _(comparison: Comparison) -> Document:
 
 def _played(explanation: Explanation) -> list[str]:
     """Returns how long a step takes, and where episodes were cut off by us."""
-    report, story, cut = explanation.report, explanation.story, set()
-    if report is not None and report.judged.truncated:
-        cut.add(report.judged.time_limit)
-    if story is not None and not story.played.episode.terminated:
-        cut.add(story.played.episode.time_limit)
+    report, story, limit = explanation.report, explanation.story, explanation.max_steps
     words = _seconds(explanation.agent.seconds_per_step)
-    if explanation.max_steps in cut - {None}:
-        words.append(f"episodes are cut off after {counted(explanation.max_steps or 0, 'step')}")
+    cut = [report.judged.time_limit] if report is not None and report.judged.truncated else []
+    if story is not None and not story.played.episode.terminated:
+        cut.append(story.played.episode.time_limit)
+    if limit is not None and limit in cut:
+        words.append(f"episodes are cut off after {counted(limit, 'step')}")
     return words
 
 

@@ -23,6 +23,16 @@ def same(a: float, b: float) -> bool:
     return abs(a - b) <= RELATIVE_ZERO * max(abs(a), abs(b))
 
 
+def difference(a: npt.ArrayLike, b: npt.ArrayLike) -> FloatArray:
+    """Returns a − b `[...]`, exactly 0 where the two are the same up to rounding.
+
+    >>> difference([0.1 + 0.2, 2.0], [0.3, 1.0]).tolist()
+    [0.0, 1.0]
+    """
+    apart, least = np.subtract(a, b), RELATIVE_ZERO * np.maximum(np.abs(a), np.abs(b))
+    return np.where(np.abs(apart) <= least, 0.0, apart)
+
+
 def map_leaves(function: Callable[[Any], Any], tree: Any) -> Any:
     """Returns a tree with a function applied to each of its arrays; None stays None.
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trdlab.agents.models import tabular_model
+from trdlab.agents.models import find_model
 from trdlab.environments.arguments import parse_arguments, parse_name, say_arguments, say_name
 from trdlab.errors import InputError
 
@@ -40,7 +40,7 @@ def test_what_is_written_is_read_as_the_same():
 
 
 def test_a_map_is_given_in_the_name_of_an_environment():
-    model = tabular_model('tabular:FrozenLake-v1,desc=["SFFF","FHFG"],is_slippery=false')
+    model = find_model('tabular:FrozenLake-v1,desc=["SFFF","FHFG"],is_slippery=false')
     assert model.world.mdp.num_states == 8
     assert model.name == 'FrozenLake-v1,desc=["SFFF","FHFG"],is_slippery=false'
 

@@ -79,7 +79,7 @@ def test_copies_of_a_moment_remember_what_came_before():
             (step + i) % 3 == 2 for i in range(3)
         ]
         expected[0] = 0.0
-        np.testing.assert_allclose(found.observed[0].mean(axis=0)[:3], expected, atol=0.05)
+        np.testing.assert_allclose(found.observed.mean(axis=0)[:3], expected, atol=0.05)
 
 
 def test_along_an_episode_copies_remember_too():

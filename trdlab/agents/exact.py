@@ -32,12 +32,7 @@ def exact_agent(
 ) -> Agent:
     """Returns the exact table of a model with a name as an agent that acts optimally in it.
 
-    Args:
-        name: `gridworld:NAME`, `gridworld:FILE` or `tabular:ENV_ID`, and after commas what to make
-            it with, such as `gridworld:ledge,slip=0.2`.
-        time_axis: γ, N and w.
-        env: an environment to act in instead, with the same states (see `find_place`).
-        env_arguments: what to make that one with, as `KEY=VALUE`.
+    The name, and another environment to act in, are given as to `find_agent`.
 
     Raises:
         InputError: the model cannot be made, or the other environment does not fit.
@@ -69,21 +64,19 @@ def model_agent(
     Raises:
         InputError: what is seen or can be done in the place is something else.
     """
-    world = model.world
-    own = Interface(gym.spaces.Discrete(world.mdp.num_states), world.action_names)
+    world, names = model.world, model.world.action_names
     if place is None:
         place = find_place(model, (), time_axis)
     else:
-        found = look(place.make)
-        own.check_fits(found, place.name)
-        if is_numbered(world.action_names):
-            own = replace(own, action_names=found.action_names)
+        own, found = gym.spaces.Discrete(world.mdp.num_states), look(place.make)
+        Interface(own, names).check_fits(found, place.name)
+        names = found.action_names if is_numbered(names) else names
     solved = exact(world.mdp, time_axis) if table is None else table
     policy = solved.solution.policy
     return Agent(
         name=model.name,
         estimator=solved,
-        action_names=own.action_names,
+        action_names=names,
         make=place.make,
         policy=Memoryless(lambda states: policy[states]),
         world=world,

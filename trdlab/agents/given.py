@@ -19,16 +19,14 @@ from trdlab.estimator import Estimator
 from trdlab.tabular import ExactTable
 from trdlab.time_axis import TimeAxis
 
-_NEEDED = ("decompose", "time_axis", "future")
-
 
 def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:
-    """Returns the agent that an object is, or that can be made of it.
+    """Returns the agent that an object is, or that can be made of it, where it acts in `env`.
 
     Args:
         what: an agent, a model, a table, or another estimator.
-        env: where it acts (see `find_place`); None where it was made for, if it was made for one.
-        env_arguments: what to make that with, as `KEY=VALUE`.
+        env: see `find_place`; None where it was made for, if it was made for one.
+        env_arguments: likewise.
         axis: γ, N and w of a model that has to be solved.
 
     Raises:
@@ -47,7 +45,7 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
         )
     if (model := model_of(what)) is not None:
         return model_agent(model, axis, place=place)
-    missing = [name for name in _NEEDED if not hasattr(what, name)]
+    missing = [name for name in ("decompose", "time_axis", "future") if not hasattr(what, name)]
     if missing:
         raise InputError(
             f"This {type(what).__name__} is no agent: it has no {' and no '.join(missing)}.",
@@ -71,11 +69,8 @@ def _moved(agent: Agent, place: Place) -> Agent:
 
 def _model_around(table: ExactTable, env: Any) -> Model:
     """Returns the model of a table, in the words of an environment that is the same model."""
-    found = None if isinstance(env, str) else model_of(env)
-    if found is None or found.world.mdp.shape != table.mdp.shape:
-        found = model_of(table.mdp)
-    assert found is not None  # a model is one
-    return found
+    models = filter(None, (model_of(env), model_of(table.mdp)))  # the latter always fits
+    return next(model for model in models if model.world.mdp.shape == table.mdp.shape)
 
 
 def _estimating(estimator: Estimator, place: Place) -> Agent:

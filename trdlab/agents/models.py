@@ -26,7 +26,6 @@ World = Gridworld | TabularWorld
 
 _ANYWHERE = "exploring_starts"
 _OF_GRIDWORLDS = ("slip", "treasure", _ANYWHERE)  # of `GridworldEnv`, what shapes its episodes
-_LEAST_STEPS, _MOST_STEPS = 100, 2_000  # of a time limit where a model has none
 _LONG = 60  # letters of a name in a message
 
 
@@ -81,27 +80,13 @@ def find_model(name: str) -> Model:
     """Returns the model of a name, for which `is_model` is true.
 
     Raises:
-        InputError: it cannot be made.
+        InputError: there is no such map or environment, it has no table, or takes no such argument.
     """
-    return tabular_model(name) if name.startswith(TABULAR) else _gridworld_model(name)
-
-
-def tabular_model(text: str) -> Model:
-    """Returns the model of an environment that carries its transition table.
-
-    Args:
-        text: its Gymnasium id, and after commas what to make it with.
-
-    Raises:
-        InputError: there is no such environment, it has no table, or does not take an argument.
-    """
-    env_id, arguments = parse_name(text.removeprefix(TABULAR))
-    world = make_world(env_id, arguments)
-    return _of_world(world, say_name(world.name.rpartition("/")[2], arguments))
-
-
-def _gridworld_model(text: str) -> Model:
-    name, arguments = parse_name(text.removeprefix(GRIDWORLD))
+    kind = TABULAR if name.startswith(TABULAR) else GRIDWORLD
+    called, arguments = parse_name(name.removeprefix(kind))
+    if kind == TABULAR:
+        model = _of(make_world(called, arguments))
+        return replace(model, name=say_name(model.name.rpartition("/")[2], arguments))
     for key in arguments:
         if key not in _OF_GRIDWORLDS:
             cause = f"A gridworld takes no argument '{key}'."
@@ -109,8 +94,9 @@ def _gridworld_model(text: str) -> Model:
     if not isinstance(arguments.get(_ANYWHERE, False), bool):
         cause = f"The argument {_ANYWHERE} is '{arguments[_ANYWHERE]}'."
         raise InputError(cause, "It must be true or false.")
-    env = GridworldEnv(name, **arguments)
-    return _of_gridworld(env.world, say_name(env.world.grid.name, arguments), env.exploring_starts)
+    env = GridworldEnv(called, **arguments)
+    model = _of(env.world, env.exploring_starts)
+    return replace(model, name=say_name(model.name, arguments))
 
 
 def model_of(what: Any) -> Model | None:
@@ -124,34 +110,31 @@ def model_of(what: Any) -> Model | None:
     """
     if isinstance(what, Model):
         return what
-    if isinstance(what, Gridworld):
-        return _of_gridworld(what, what.grid.name)
-    if isinstance(what, TabularWorld):
-        return _of_world(what, what.name)
+    if isinstance(what, Gridworld | TabularWorld):
+        return _of(what)
     if isinstance(what, MDP):
-        return _of_world(TabularWorld(what, "a model", numbered(what.num_actions)), "a model")
+        return _of(TabularWorld(what, "a model", numbered(what.num_actions)))
     base, spec = getattr(what, "unwrapped", None), getattr(what, "spec", None)
     if isinstance(base, GridworldEnv):
-        model = _of_gridworld(base.world, base.world.grid.name, base.exploring_starts)
-        return replace(model, time_limit=spec.max_episode_steps if spec else None)
+        limit = spec.max_episode_steps if spec else None
+        return replace(_of(base.world, base.exploring_starts), time_limit=limit)
     if hasattr(base, "P") or isinstance(getattr(base, "mdp", None), MDP):
-        world = tabular_world(what)
-        return _of_world(world, world.name)
+        return _of(tabular_world(what))
     return None
 
 
-def _of_gridworld(world: Gridworld, name: str, exploring_starts: bool = False) -> Model:
+def _of(world: World, exploring_starts: bool = False) -> Model:
+    """Returns the model of a world by its own name; a gridworld has neither starts nor a limit."""
+    if isinstance(world, TabularWorld):
+        return Model(world.name, world, world.starts, world.time_limit)
     running = reachable(world.mdp) & ~world.mdp.terminal_states
-    return Model(name, world, running / running.sum() if exploring_starts else None, None)
-
-
-def _of_world(world: TabularWorld, name: str) -> Model:
-    return Model(name, world, world.starts, world.time_limit)
+    starts = running / running.sum() if exploring_starts else None
+    return Model(world.grid.name, world, starts, None)
 
 
 def _usual_limit(world: World) -> int:
     """Returns the steps after which episodes are cut off where a model has no limit."""
     if isinstance(world, Gridworld):
         rows, columns = world.grid.shape
-        return max(_LEAST_STEPS, 4 * rows * columns)
-    return min(max(_LEAST_STEPS, 4 * world.mdp.num_states), _MOST_STEPS)
+        return max(100, 4 * rows * columns)
+    return min(max(100, 4 * world.mdp.num_states), 2_000)

@@ -15,7 +15,6 @@ from trdlab.runs.checkpoint import checkpoint_steps
 from trdlab.runs.folder import RunFolder
 from trdlab.tabular.toytext import toy_text_ids
 
-_DIGITS = 19  # more are no number of steps
 _OWN_AXIS = "is a run with its own γ, N and w."
 _LEAVE_OUT = "Leave out `gamma`, `horizon` and `width`."
 
@@ -76,7 +75,7 @@ def _checkpoint(name: str) -> tuple[Path, int | None]:
     folder, at, step = name.rpartition("@")
     if not at or not folder or Path(name).exists():
         return Path(name), None
-    if step.isdecimal() and len(step) < _DIGITS:
+    if step.isdecimal() and len(step) < 19:  # more digits are no number of steps
         return Path(folder), int(step)
     steps = checkpoint_steps(RunFolder.open(Path(folder)))
     raise InputError(
@@ -110,9 +109,7 @@ def find_pair(
         raise InputError(f"Each of the two {_OWN_AXIS}", _LEAVE_OUT)
     found, axis = {}, changed(AXIS, *given)
     for name in sorted(names, key=is_model):  # runs first
-        if is_model(name):
-            found[name] = find_agent(name, **asdict(axis), **where)
-        else:
-            found[name] = find_agent(name, **where)
-            axis = changed(found[name].estimator.time_axis, *given)
+        own = asdict(axis) if is_model(name) else {}
+        found[name] = find_agent(name, **own, **where)
+        axis = changed(found[name].estimator.time_axis, *given)
     return found[names[0]], found[names[1]]

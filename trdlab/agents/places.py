@@ -22,8 +22,6 @@ from trdlab.tabular import MDP
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""
 
-_CHANGING_NOTHING = (TimeLimit, OrderEnforcing, PassiveEnvChecker)
-
 AXIS = TimeAxis(0.95, 4)
 """Of an exact table, where nothing is said."""
 
@@ -148,7 +146,7 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
 def _mdp_of(env: Any) -> MDP | None:
     """Returns the model of an environment, unless a wrapper may change what comes of it."""
     bare = env
-    while isinstance(bare, _CHANGING_NOTHING):
+    while isinstance(bare, TimeLimit | OrderEnforcing | PassiveEnvChecker):  # they change nothing
         bare = bare.env
     try:
         found = model_of(bare) if bare is getattr(bare, "unwrapped", None) else None

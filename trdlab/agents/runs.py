@@ -27,13 +27,9 @@ def run_agent(
     env: Where | None = None,
     env_arguments: Sequence[str] = (),
 ) -> Agent:
-    """Returns the agent of a run, with the environments it was trained in or others that fit.
+    """Returns the agent of a run, or of its checkpoint at an older agent step.
 
-    Args:
-        path: the run's folder.
-        step: of an older checkpoint, in agent steps.
-        env: another environment to act in (see `find_place`).
-        env_arguments: what to make that one with, as `KEY=VALUE`.
+    It acts in the environments it was trained in, or in others that fit (see `find_agent`).
 
     Raises:
         InputError: there is no run or no such checkpoint, or the environment does not fit.
@@ -48,7 +44,7 @@ def run_agent(
         raise InputError("The run says what its environment is made with.", "Give `env` too.")
     use_threads(settings)
     estimator = load(path, step)
-    place = _place(settings, env, env_arguments)
+    place, is_game = _place(settings, env, env_arguments)
     found, known = look(place.make), interface_of(folder)
     if settings.action_names and env is None:
         found = found.named(settings.action_names)
@@ -62,25 +58,22 @@ def run_agent(
         make=place.make,
         seconds_per_step=found.seconds_per_step,
         origin=place.origin(f"{path}{at}", None, away=env is not None, module=module),
-        copying=_OF_GAMES if _is_atari(settings, env) else Copying(),
+        copying=_OF_GAMES if is_game else Copying(),
     )
 
 
-def _is_atari(settings: "TrainSettings", env: Where | None) -> bool:
-    named = env is None or (isinstance(env, str) and not is_model(env))
-    return settings.kind == "atari" and named
-
-
-def _place(settings: "TrainSettings", env: Where | None, env_arguments: Sequence[str]) -> Place:
-    """Returns where the agent of a run acts: where it was trained, or in another environment."""
+def _place(
+    settings: "TrainSettings", env: Where | None, env_arguments: Sequence[str]
+) -> tuple[Place, bool]:
+    """Returns where the agent of a run acts, by default where it was trained; and if in a game."""
     from trdlab.training.setup import make_environments
 
     if env is None:
         check_imported(settings.env)
         env, env_arguments = settings.env, settings.env_arg
     place = find_place(env, env_arguments, settings.time_axis)
-    if not isinstance(env, str) or not _is_atari(settings, env):
-        return place
+    if settings.kind != "atari" or not isinstance(env, str) or is_model(env):
+        return place, False
     there = replace(settings, env=env, env_arg=tuple(env_arguments))
     make = lambda num, seed: make_environments(there, num_envs=num, seed=seed)  # noqa: E731
-    return replace(place, make=make)
+    return replace(place, make=make), True

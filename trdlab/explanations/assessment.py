@@ -260,5 +260,5 @@ def trial_of(
     agent: Agent, tried: tuple[Branches, Branches], report: CalibrationReport | None, *, seed: int
 ) -> Trial:
     """Returns how two actions differ that an agent tried, held against what it knows otherwise."""
-    found = compared(tried, None if report is None else report.seen, seed=seed)
+    found = compared(tried, *(() if report is None else report.seen), seed=seed)
     return Trial(found, agent.action_names, agent.seconds_per_step)

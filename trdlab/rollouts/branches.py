@@ -13,7 +13,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
 from trdlab.policies import Policy
 from trdlab.rollouts.playing import Playing, Watch, unwatched
-from trdlab.rollouts.realised import Samples, all_or_none
+from trdlab.rollouts.realised import Samples
 
 
 class TooFewMoments(InputError):  # noqa: N818  it says what episodes are, not what failed
@@ -21,47 +21,20 @@ class TooFewMoments(InputError):  # noqa: N818  it says what episodes are, not w
 
 
 @dataclass(frozen=True, eq=False)
-class Branches:
-    """M moments of E episodes, and what followed each of them n times, from copies of its state.
+class Branches(Samples):
+    """What followed each moment of some episodes n times, from copies of its state.
+
+    The samples of a moment stand together, and what is known is known of all n.
 
     Args:
-        time_axis: what the components mean.
         actions: `[M]`, the first action of every copy.
-        predicted: `[M, N+1]`, what was predicted of it, in discounted reward.
-        observed: `[M, n, N+1]`, what followed, in discounted reward.
-        known: `[M, N+1]`, whether that is known of all n.
-        episode: `[M]`, the number of the episode of each, in order.
-        num_episodes: E.
+        copies: n.
         shared_chance: whether copies were seen to know chance that is not their own.
     """
 
-    time_axis: TimeAxis
     actions: IntArray
-    predicted: FloatArray
-    observed: FloatArray
-    known: BoolArray
-    episode: IntArray
-    num_episodes: int
-    shared_chance: bool = False
-
-    @property
-    def copies(self) -> int:
-        """How often each moment was continued."""
-        return int(self.observed.shape[1])
-
-    @property
-    def samples(self) -> Samples:
-        """All that followed as M·n samples, for `calibrate`; of foils: their calibration."""
-        n = self.copies
-        known = np.repeat(self.known, n, axis=0)
-        return Samples(
-            time_axis=self.time_axis,
-            predicted=np.repeat(self.predicted, n, axis=0),
-            observed=np.where(known, self.observed.reshape(known.shape), 0.0),
-            known=known,
-            episode=np.repeat(self.episode, n),
-            num_episodes=self.num_episodes,
-        )
+    copies: int
+    shared_chance: bool
 
 
 @dataclass(frozen=True)
@@ -160,7 +133,7 @@ class Branching:
                 found.append(self._continued(playing, due, first, rng))
             playing.take(turn.actions)
             watch(playing.progress(what))
-        copied = sum(len(part.actions) for part in found)
+        copied = sum(map(len, found)) // self.copies
         if copied < 2:
             raise TooFewMoments(
                 f"The episodes are so short that there are moments in them: {copied}.",
@@ -193,54 +166,54 @@ class Branching:
     ) -> Branches:
         """Continues the `moments [M]` with the actions `first [M]`."""
         axis, future = self.estimator.time_axis, self.estimator.future
-        here = np.searchsorted(np.flatnonzero(playing.running), moments)  # [M], of those asked
-        predicted = playing.decide().decomposition.components[here, first]  # [M, N+1]
-        which, length = np.repeat(moments, self.copies), self.steps or axis.num_steps  # [M·n]
-        branch = playing.branch(which, seed=int(rng.integers(2**31)), rng=rng, max_steps=length)
+        which, actions = (np.repeat(of, self.copies) for of in (moments, first))  # [M·n]
+        here = np.searchsorted(np.flatnonzero(playing.running), which)  # [M·n], of those asked
+        predicted = playing.decide().decomposition.components[here, actions]  # [M·n, N+1]
+        length = self.steps or axis.num_steps
+        branch = playing.branch(which, rng=rng, max_steps=length)
         with closing(branch.environments):
-            rewards, ended = _followed(branch, np.repeat(first, self.copies), length, future)
+            rewards, ended = _followed(branch, actions, length, future)
         limit = None if future.time_limit_ends else playing.environments.time_limit
         observed, known = _on_axis(axis, rewards, ended, limit, playing.steps)
-        shape = (len(moments), self.copies, axis.num_components)
+        of_all = known.reshape(len(moments), self.copies, -1).all(axis=1)  # [M, N+1]
         return Branches(
             time_axis=axis,
-            actions=first,
             predicted=predicted.astype(np.float64),
-            observed=observed.reshape(shape),
-            known=np.asarray(known.reshape(shape).all(axis=1)),
-            episode=moments,
+            observed=observed,
+            known=np.repeat(of_all, self.copies, axis=0),
+            episode=which,
             num_episodes=playing.environments.num_envs,
+            actions=actions,
+            copies=self.copies,
             shared_chance=getattr(branch.environments, "shared_chance", False),
         )
 
 
 def _followed(
     branch: Playing, actions: IntArray, length: int, future: Future
-) -> tuple[FloatArray, IntArray]:
-    """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, the ends.
-
-    An end is the number of steps until nothing is left to come; −1 where none was seen.
-    """
-    rewards, ended = np.zeros((len(actions), length)), np.full(len(actions), -1)
+) -> tuple[FloatArray, BoolArray]:
+    """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, what ended."""
+    rewards, ended = np.zeros((len(actions), length)), np.zeros(len(actions), dtype=np.bool_)
     while branch.running.any():
         running, t = branch.running, branch.steps
         step = branch.take(branch.turn().actions if t else actions)
         rewards[running, t] = future.count(step.rewards)[running]
         end = running & future.ends(step.terminated, step.truncated, step.life_lost)
-        ended[end] = t + 1
+        ended |= end
         rewards[running & step.truncated & ~end, t + 1 :] = np.nan
-        branch.stop(end)
+        branch.running = branch.running & ~end
     return rewards, ended
 
 
 def _joined(found: list[Branches]) -> Branches:
-    """Returns the moments of all times, in the order of their episodes."""
+    """Returns the moments of all times by episode; a residual is known of all of them or none."""
     order = np.argsort(np.concatenate([part.episode for part in found]), kind="stable")
-    names = ("actions", "predicted", "observed", "known", "episode")
+    names = ("predicted", "observed", "known", "episode", "actions")
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in found])[order] for name in names
     }
-    arrays["known"] = all_or_none(arrays["known"])
+    arrays["known"][:, -1] &= arrays["known"][:, -1].all()
+    arrays["observed"] = np.where(arrays["known"], arrays["observed"], 0.0)
     return replace(found[0], **arrays)
 
 
@@ -252,9 +225,9 @@ def _others(actions: IntArray, num_actions: int, rng: np.random.Generator) -> In
 
 
 def _on_axis(
-    axis: TimeAxis, rewards: FloatArray, ended: IntArray, time_limit: int | None, age: int
+    axis: TimeAxis, rewards: FloatArray, ended: BoolArray, time_limit: int | None, age: int
 ) -> tuple[FloatArray, BoolArray]:
-    """Returns `[B, N+1]` twice: the components of `rewards [B, steps]`, and where they are known.
+    """Returns `[B, N+1]` twice: the components of `rewards [B, steps]`, and which are known.
 
     As in `what_followed`, nothing beyond a `time_limit` is known, wherever the episode ended.
     """
@@ -264,8 +237,8 @@ def _on_axis(
     residual = discounted[:, axis.num_steps :].sum(axis=1)
     observed = np.column_stack([explicit.sum(axis=2), residual])  # [B, N+1]
     known = ~np.isnan(observed)
-    known[:, -1] &= ended >= 0
+    known[:, -1] &= ended
     if time_limit is not None:
         beyond = age + axis.width * np.arange(1, axis.num_components)
         known[:, :-1] &= beyond <= time_limit
-    return np.where(known, observed, 0.0), known
+    return observed, known

@@ -4,26 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trdlab.arrays import RELATIVE_ZERO, FloatArray
+from trdlab.arrays import FloatArray, difference
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.rollouts.branches import Branches, Branching
 from trdlab.rollouts.playing import Playing
 from trdlab.statistics import Estimates, mean_difference
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """What is known from elsewhere of the rewards that can come.
-
-    Args:
-        range: `[2, N+2]`, the least and the most that ever came of every component, and of all
-            together.
-        chance: whether a state ever led to different things; None where that was not looked at.
-    """
-
-    range: FloatArray
-    chance: bool | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +55,11 @@ def try_actions(
 
 
 def compared(
-    tried: tuple[Branches, Branches], seen: Seen | None = None, *, seed: int = 0
+    tried: tuple[Branches, Branches],
+    seen: FloatArray | None = None,
+    chance: bool | None = None,
+    *,
+    seed: int = 0,
 ) -> Counterfactual:
     """Returns how two actions differ that were tried.
 
@@ -79,19 +69,21 @@ def compared(
 
     Args:
         tried: what followed the one and the other.
-        seen: what is known from elsewhere of the rewards that can come.
+        seen: `[2, N+2]`, the least and the most that ever came elsewhere of each component, and of
+            all together.
+        chance: whether a state ever led to different things; None where that was not looked at.
         seed: of the intervals.
     """
     whole = all(bool(branches.known[0, -1]) for branches in tried)
     one, other = (_futures(branches, whole) for branches in tried)  # [n, N+2]
     said = np.stack([_with_sum(branches.predicted[0], whole) for branches in tried])  # [2, N+2]
     same = not any(np.nan_to_num(np.ptp(of, axis=0)).any() for of in (one, other))
-    chance = any(branches.shared_chance for branches in tried) or (seen and seen.chance)
+    chance = any(branches.shared_chance for branches in tried) or chance
     if same and (chance is False or (chance is None and np.nan_to_num(one + other).any())):
         value = one.mean(axis=0) - other.mean(axis=0)
         observed = Estimates(value, value, value)
     else:
-        came = np.concatenate([one, other, *([] if seen is None else [seen.range])])
+        came = np.concatenate([one, other, *([] if seen is None else [seen])])
         ends = _extremes(tried[0].time_axis, came, said)
         observed = mean_difference(one, other, *ends, rng=np.random.default_rng(seed))
     return Counterfactual(
@@ -100,7 +92,7 @@ def compared(
         foil=int(tried[1].actions[0]),
         copies=tried[0].copies,
         whole=whole,
-        predicted=_apart(*said),
+        predicted=difference(*said),
         observed=observed,
         same_every_time=same,
     )
@@ -121,15 +113,9 @@ def _extremes(axis: TimeAxis, came: FloatArray, said: FloatArray) -> tuple[Float
     return least, most
 
 
-def _apart(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Returns one − other, 0 where they differ only by rounding."""
-    difference, least = one - other, RELATIVE_ZERO * np.maximum(np.abs(one), np.abs(other))
-    return np.where(np.abs(difference) <= least, 0.0, difference)
-
-
 def _futures(branches: Branches, whole: bool) -> FloatArray:
     """Returns `[n, N+2]`: every component of what followed, and their sum; NaN if not known."""
-    observed = np.where(branches.known[0], branches.observed[0], np.nan)  # [n, N+1]
+    observed = np.where(branches.known, branches.observed, np.nan)  # [n, N+1]
     if not whole and branches.time_axis.horizon == 0:
         return np.column_stack([observed, observed])  # the sum of nothing that was seen is no 0
     return _with_sum(observed, whole)

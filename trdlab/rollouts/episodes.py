@@ -107,7 +107,7 @@ class Recording:
         self._logs: list[list[tuple[Any, ...]]] = [[] for _ in range(count)]
         first = self.playing.stack.observations  # [B, ...]
         self._states = [[state] for state in first] if first.ndim == 1 else []
-        self._last, self._terminated = [np.zeros(0)] * count, np.zeros(count, dtype=np.bool_)
+        self._last = np.zeros((count, estimator.time_axis.num_components))
 
     def play(
         self, until: int | None = None, *, watch: Watch = unwatched, what: str = "episodes"
@@ -144,17 +144,15 @@ class Recording:
         running, decision, turn = playing.running, playing.decide(), playing.turn()
         step = playing.take(turn.actions)
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
-        happened = (turn.actions, future.count(step.rewards), step.life_lost, ends, turn.random)
+        told = (step.life_lost, ends, step.terminated, turn.random)
+        happened = (turn.actions, future.count(step.rewards), *told)
         seen = zip(decision.decomposition.components, decision.expected, strict=True)
         for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
             self._logs[env].append((*expectations, *(part[env] for part in happened)))
             if self._states:
                 self._states[env].append(step.frames[env])
         if playing.finished.any():
-            final = playing.at_last().expected
-            for env, expected in zip(np.flatnonzero(playing.finished), final, strict=True):
-                self._last[env] = expected
-            self._terminated |= playing.finished & step.terminated
+            self._last[playing.finished] = playing.at_last().expected
 
     def episodes(self) -> tuple[Episode, ...]:
         """Returns the E episodes, once all of them are over, in the order of the environments."""
@@ -169,7 +167,7 @@ class Recording:
     def _episode(self, env: int, coins: BoolArray, time_limit: int | None) -> Episode:
         """Returns the episode of an environment, of its log and of coins for past its end."""
         columns = [np.stack(column) for column in zip(*self._logs[env], strict=True)]
-        components, expected, actions, rewards, life_lost, ends, random = columns
+        components, expected, actions, rewards, life_lost, ends, terminated, random = columns
         return Episode(
             decomposition=RewardDecomposition(components, self._estimator.time_axis),
             expected=np.concatenate([expected, self._last[env][None]]).astype(np.float64),
@@ -177,7 +175,7 @@ class Recording:
             rewards=rewards.astype(np.float64),
             life_lost=life_lost,
             ends=ends,
-            terminated=bool(self._terminated[env]),
+            terminated=bool(terminated[-1]),
             random=np.concatenate([random, coins]),
             epsilon=self._epsilon,
             time_limit=time_limit,

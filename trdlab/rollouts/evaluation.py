@@ -1,7 +1,7 @@
 """How well an agent plays: whole episodes, and the returns that the environment pays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,7 @@ class Evaluation:
         truncated: `[E]`, whether an episode was cut off rather than ended.
         epsilon: the chance of a random action.
         seed: of the environments and of the random actions.
-        max_steps: after which an episode was cut off, if not before; None for the environment's own
-            limit alone.
+        max_steps: after which an episode was cut off, if the environment had not done so before.
     """
 
     returns: FloatArray
@@ -47,17 +46,14 @@ class Evaluation:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns plain data, for JSON."""
-        means = {"mean": self.mean, "interquartile_mean": self.interquartile_mean}
         return {
             "schema": "trdlab.evaluation/1",
             "episodes": len(self.returns),
             "epsilon": self.epsilon,
             "seed": self.seed,
             "max_steps": self.max_steps,
-            **{
-                name: {"value": of.value, "low": of.low, "high": of.high, "level": 0.95}
-                for name, of in means.items()
-            },
+            "mean": {**asdict(self.mean), "level": 0.95},
+            "interquartile_mean": {**asdict(self.interquartile_mean), "level": 0.95},
             "returns": self.returns.tolist(),
             "lengths": self.lengths.tolist(),
             "truncated": self.truncated.tolist(),

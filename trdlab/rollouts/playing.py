@@ -1,6 +1,7 @@
 """Playing: what an agent decides, step by step, and where that leads."""
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,9 +15,6 @@ from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.policies import Policy, ask, greedy, rows
-
-LONGEST = 1_000
-"""Steps after which an episode is no longer played, where nothing else is said."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +50,10 @@ def part_of(watch: Watch, before: int, episodes: int) -> Watch:
 def usual_limit(axis: TimeAxis) -> int:
     """Returns after how many steps an episode is cut off, where nothing else is said.
 
-    That is `LONGEST`, or four horizons if they are longer: an agent that gets stuck would else play
-    on until the environment stops it, in an Atari game after half an hour of play.
+    That is 1,000, or four horizons if they are longer: an agent that gets stuck would else play on
+    until the environment stops it, in an Atari game after half an hour of play.
     """
-    return max(LONGEST, 4 * axis.num_steps)
+    return max(1_000, 4 * axis.num_steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,12 +108,10 @@ class Playing:
         epsilon: the chance of a random action in place of the policy's.
         chance: of the random actions.
         max_steps: after which an episode is cut off, if not before.
-        stack: what is seen in the midst of episodes that have begun; without it they are reset.
-        memory: what the policy remembers of those.
 
     Attributes:
         stack: what is seen.
-        running: `[B]`, which episodes go on.
+        running: `[B]`, which episodes go on; whoever plays may leave off some.
         finished: `[B]`, which ones the last step has brought to an end.
         steps: how many have been taken.
 
@@ -133,23 +129,19 @@ class Playing:
         epsilon: float = 0.0,
         chance: np.random.Generator | None = None,
         max_steps: int | None = None,
-        stack: FrameStack | None = None,
-        memory: Any = None,
     ) -> None:
-        if max_steps is not None and max_steps < 1 and stack is None:
+        if max_steps is not None and max_steps < 1:
             raise InputError(f"Episodes have {max_steps} steps.", "Ask for at least 1.")
         self.environments, self.max_steps, self.steps = environments, max_steps, 0
-        self._begins = stack is None
-        if stack is None:
-            with blamed("when it was reset"):
-                frames = environments.reset()
-            stack = FrameStack(frames, environments.stack, environments.padding)
-        self.stack = stack
-        self.running: BoolArray = np.full(environments.num_envs, max_steps != 0)
+        with blamed("when it was reset"):
+            frames = environments.reset()
+        self.stack = FrameStack(frames, environments.stack, environments.padding)
+        self.running: BoolArray = np.ones(environments.num_envs, dtype=np.bool_)
         self.finished: BoolArray = ~self.running
         self._estimator, self._policy, self._rng = estimator, policy, rng
         self._epsilon, self._chance = epsilon, chance or rng
-        self._memory, self._asked = memory, np.arange(environments.num_envs)  # [R], whose it is
+        self._memory: Any = None
+        self._asked = np.arange(environments.num_envs)  # [R], whose memory it is
         self._decision: Decision | None = None
         self._turn: Turn | None = None
         self._last: Any = None
@@ -188,14 +180,11 @@ class Playing:
         self.steps += 1
         over = step.ended | (self.steps == self.max_steps)  # [B]
         self.finished, self.running = self.running & over, self.running & ~over
-        self._last = self._last_seen(step.frames)
-        self.stack.push(step.following, step.ended)
-        self._decision, self._turn, self._begins = None, None, False
+        self.stack.push(step.frames, np.zeros_like(over))  # where episodes end, their last ones
+        self._last = self.stack.observations[self.finished]
+        self.stack.begin(step.following, step.ended)
+        self._decision, self._turn = None, None
         return step
-
-    def stop(self, where: BoolArray) -> None:
-        """Plays no further `where [B]`."""
-        self.running = self.running & ~where
 
     def progress(self, what: str) -> Progress:
         """Returns how far the episodes are, and what they are played for."""
@@ -211,17 +200,14 @@ class Playing:
         nowhere = np.zeros(len(self._last), dtype=np.bool_)
         return Decision(told, ask(self._policy, self._last, memory, nowhere)[0])
 
-    def branch(
-        self, which: IntArray, *, seed: int, rng: np.random.Generator, max_steps: int
-    ) -> "Playing":
+    def branch(self, which: IntArray, *, rng: np.random.Generator, max_steps: int) -> "Playing":
         """Returns copies of episodes at this step, with what their policy remembers of it.
 
         The policy has been asked about this step: the first thing to do with copies is to `take`.
 
         Args:
             which: `[B′]`, the number of the running episode that each is a copy of.
-            seed: of the copies' own chance.
-            rng: of the policy's draws.
+            rng: of the copies' own chance, and of the policy's draws.
             max_steps: after which a copy is followed no further.
 
         Raises:
@@ -230,35 +216,28 @@ class Playing:
         if not hasattr(self.environments, "branch"):
             raise NotCopyable("The environments cannot be copied.", "Give them a method branch.")
         self.turn()
-        stack = FrameStack(self.stack.newest[which], self.stack.size, self.stack.padding)
-        stack.frames[:] = self.stack.frames[which]
-        return Playing(
-            self._estimator,
-            self.environments.branch(which, seed),
-            rng,
-            policy=self._policy,
-            max_steps=max_steps,
-            stack=stack,
-            memory=rows(self._memory, np.searchsorted(self._asked, which)),
-        )
+        other = copy(self)
+        other.environments = self.environments.branch(which, int(rng.integers(2**31)))
+        other.max_steps, other.steps, other._rng, other._epsilon = max_steps, 0, rng, 0.0
+        other.stack = copy(self.stack)
+        other.stack.frames = self.stack.frames[which]
+        other.running = np.full(len(which), max_steps > 0)
+        other.finished = np.zeros(len(which), dtype=np.bool_)
+        other._memory = rows(self._memory, np.searchsorted(self._asked, which))
+        other._asked = np.arange(len(which))
+        other._decision, other._turn = None, None
+        return other
 
     def _told(self, observations: Any) -> RewardDecomposition:
         if self._estimator is None:
             raise TypeError("Nobody was given who expects anything.")
         return self._estimator.decompose(observations)
 
-    def _last_seen(self, frames: Any) -> Any:
-        """Returns the true last observations of what has finished, from `frames [B, ...]`."""
-        last = frames[self.finished]
-        if self.stack.size is None:
-            return last
-        return np.concatenate([self.stack.frames[self.finished, 1:], last[:, None]], axis=1)
-
     def _ask(self, policy: Policy, observations: Any) -> FloatArray:
         """Returns how likely the policy takes each action `[R, A]`, and lets it remember."""
         memory = rows(self._memory, self.running[self._asked])
         self._asked = np.flatnonzero(self.running)
-        begins = np.full(len(self._asked), self._begins)
+        begins = np.full(len(self._asked), self.steps == 0)
         likely, self._memory = ask(policy, observations, memory, begins)
         return likely
 

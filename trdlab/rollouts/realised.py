@@ -34,15 +34,10 @@ class Samples:
     def __len__(self) -> int:
         return len(self.predicted)
 
-    def per_episode(self, values: FloatArray) -> FloatArray:
-        """Returns `[E, ...]`: the sums of `values [M, ...]` over each episode."""
-        return per_episode(values, self.episode, self.num_episodes)
-
-
-def per_episode(values: FloatArray, episode: IntArray, num_episodes: int) -> FloatArray:
-    """Returns `[E, ...]`: the sums of `values [M, ...]` by `episode [M]`, which is in order."""
-    bounds = np.searchsorted(episode, np.arange(1, num_episodes))
-    return np.stack([part.sum(axis=0) for part in np.split(values, bounds)])
+    def per_episode(self, values: FloatArray, every: int = 1) -> FloatArray:
+        """Returns `[E, ...]`: the sums by episode of `values [M/every, ...]`, of one in `every`."""
+        bounds = np.searchsorted(self.episode[::every], np.arange(1, self.num_episodes))
+        return np.stack([part.sum(axis=0) for part in np.split(values, bounds)])
 
 
 def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
@@ -60,17 +55,15 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
     """
     axis, total, far = episode.time_axis, len(episode), np.iinfo(np.int64).max
     steps, starts = np.arange(axis.num_steps), np.arange(total)
-    end = next_flag(episode.ends, far)[:total]  # [T], the step after which nothing comes
-    observed = np.zeros((total, axis.num_components))
-    padded = np.concatenate([episode.rewards, np.zeros(axis.num_steps)])
-    if axis.horizon:
-        windows = np.lib.stride_tricks.sliding_window_view(padded, axis.num_steps)[:total]
-        alive = starts[:, None] + steps <= end[:, None]  # [T, N·w]
-        rewards = np.where(alive, windows, 0.0) * axis.gamma**steps
-        observed[:, :-1] = rewards.reshape(total, axis.horizon, axis.width).sum(axis=2)
-    later = np.concatenate([_returns(episode, axis.gamma), np.zeros(axis.num_steps)])
-    residual = later[starts + axis.num_steps] * axis.gamma**axis.num_steps
-    observed[:, -1] = np.where(starts + axis.num_steps <= end, residual, 0.0)
+    end = next_flag(episode.ends, far)  # [T], the step after which nothing comes
+    padded = np.append(episode.rewards, np.zeros(axis.num_steps))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, axis.num_steps)[:total]
+    alive = starts[:, None] + steps <= end[:, None]  # [T, N·w]
+    rewards = np.where(alive, windows, 0.0) * axis.gamma**steps
+    explicit = rewards.reshape(total, axis.horizon, axis.width).sum(axis=2)
+    later = np.append(_returns(episode, axis.gamma), np.zeros(axis.num_steps))[axis.num_steps :]
+    residual = np.where(starts + axis.num_steps <= end, later * axis.gamma**axis.num_steps, 0.0)
+    observed = np.column_stack([explicit, residual])
 
     beyond = starts[:, None] + axis.width * np.arange(1, axis.num_components)  # [T, N], its end
     known = (end[:, None] < far) | (beyond <= total)
@@ -78,8 +71,7 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
         known &= beyond <= episode.time_limit
     random = np.append(episode.random, False)
     known &= beyond <= next_flag(random, far)[1 : total + 1, None]
-    known_residual = (end < far) & (episode.epsilon == 0.0)
-    known = np.concatenate([known, known_residual[:, None]], axis=1)
+    known = np.column_stack([known, (end < far) & (episode.epsilon == 0.0)])
     return np.where(known, observed, 0.0), known
 
 
@@ -93,22 +85,16 @@ def pool(episodes: Sequence[Episode]) -> Samples:
         InputError: there are no episodes, or they are of different time axes.
     """
     time_axis = common_axis(episodes)
-    observed, known = zip(*map(what_followed, episodes), strict=True)
+    observed, known = map(np.concatenate, zip(*map(what_followed, episodes), strict=True))
+    known[:, -1] &= known[:, -1].all()
     return Samples(
         time_axis=time_axis,
         predicted=np.concatenate([episode.predicted for episode in episodes]).astype(np.float64),
-        observed=np.concatenate(observed),
-        known=all_or_none(np.concatenate(known)),
+        observed=observed,
+        known=known,
         episode=np.repeat(np.arange(len(episodes)), [len(episode) for episode in episodes]),
         num_episodes=len(episodes),
     )
-
-
-def all_or_none(known: BoolArray) -> BoolArray:
-    """Returns what is known `[M, N+1]`, of the residual only if it is known of all M."""
-    known = known.copy()
-    known[:, -1] = known[:, -1].all()
-    return known
 
 
 def common_axis(episodes: Sequence[Episode]) -> TimeAxis:

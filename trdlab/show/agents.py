@@ -32,11 +32,13 @@ def _(explanation: Explanation) -> Document:
     heading = [agent.name]
     if choice is not None or explanation.story is not None:
         heading.append(seed if choice is None else f"step {explanation.step} of {seed}")
+    if choice is not None and explanation.parts and "contrast" not in explanation.parts:
+        choice = replace(choice, foil=None)  # their difference is told to who asks for a contrast
     return Document(
         heading=" · ".join(heading),
         setting=(*axis_words(explanation.time_axis), *_played(explanation)),
         scene=None if state is None or agent.world is None else scene_of(agent.world, state),
-        table=_shown(explanation),
+        table=None if choice is None else action_table(choice),
         answer=tuple(claim.sentence for claim in explanation.answer),
         sections=explanation.sections,
         folded=not explanation.parts,
@@ -65,24 +67,15 @@ def _(comparison: Comparison) -> Document:
     )
 
 
-def _shown(explanation: Explanation) -> Table | None:
-    """Returns the actions shown; the difference of two only to who asks for a contrast."""
-    choice, parts = explanation.choice, explanation.parts
-    if choice is None:
-        return None
-    return action_table(choice if not parts or "contrast" in parts else replace(choice, foil=None))
-
-
 def _played(explanation: Explanation) -> list[str]:
     """Returns how long a step takes, and where episodes were cut off by us."""
-    report, story, cut = explanation.report, explanation.story, set()
-    if report is not None and report.judged.truncated:
-        cut.add(report.judged.time_limit)
-    if story is not None and not story.played.episode.terminated:
-        cut.add(story.played.episode.time_limit)
+    report, story, limit = explanation.report, explanation.story, explanation.max_steps
     words = _seconds(explanation.agent.seconds_per_step)
-    if explanation.max_steps in cut - {None}:
-        words.append(f"episodes are cut off after {counted(explanation.max_steps or 0, 'step')}")
+    cut = [report.judged.time_limit] if report is not None and report.judged.truncated else []
+    if story is not None and not story.played.episode.terminated:
+        cut.append(story.played.episode.time_limit)
+    if limit is not None and limit in cut:
+        words.append(f"episodes are cut off after {counted(limit, 'step')}")
     return words
 
 

@@ -25,9 +25,9 @@ class Scene:
         rules: what else decides the numbers, such as a slip probability.
         drawing: the map as text, empty where there is none.
         legend: what its symbols mean.
-        notes: what the numbers leave out.
         world: what JSON says of the world, and in which schema.
         state: what it says of the state, besides its index.
+        notes: what the numbers leave out.
     """
 
     heading: str
@@ -36,9 +36,9 @@ class Scene:
     rules: tuple[str, ...]
     drawing: str
     legend: tuple[str, ...]
-    notes: tuple[str, ...]
     world: dict[str, Any]
     state: dict[str, Any]
+    notes: tuple[str, ...] = ()
 
 
 def scene_of(world: Gridworld | TabularWorld, state: int) -> Scene:
@@ -48,6 +48,7 @@ def scene_of(world: Gridworld | TabularWorld, state: int) -> Scene:
 
 def _on_map(world: Gridworld, state: int) -> Scene:
     grid, here = world.grid, world.states[state]
+    collected = sorted(map(list, here.collected))
     rules = [f"slip {plain(grid.slip)}"] * bool(grid.slip)
     rules += [f"each step costs {plain(grid.step_cost)}"] * bool(grid.step_cost)
     told = {name: getattr(grid, name) for name in ("name", "title", "rows", "slip", "step_cost")}
@@ -58,13 +59,8 @@ def _on_map(world: Gridworld, state: int) -> Scene:
         rules=tuple(rules),
         drawing=ansi(world, state),
         legend=legend(world),
-        notes=(),
         world={"schema": "trdlab.gridworld/2", "map": {**told, "num_states": len(world.states)}},
-        state={
-            "row": here.row,
-            "column": here.column,
-            "collected": sorted(map(list, here.collected)),
-        },
+        state={"row": here.row, "column": here.column, "collected": collected},
     )
 
 
@@ -101,6 +97,4 @@ def _in_table(world: TabularWorld, state: int) -> Scene:
 
 
 def _is_plain(value: Any) -> bool:
-    return isinstance(value, bool | int | str) or (
-        isinstance(value, float) and math.isfinite(value)
-    )
+    return isinstance(value, int | str) or (isinstance(value, float) and math.isfinite(value))

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from trdlab.arrays import FloatArray, same
+from trdlab.arrays import FloatArray, difference
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.formatting import amount, decimals_for, decimals_to_tell, number
 
@@ -44,15 +44,17 @@ def action_table(choice: Choice) -> Table | None:
         values = (number(float(value), of) for value in (*components, q))
         return (name, *values, *[amount(total)] * has_totals, note)
 
+    notes = [_note(moment, i) for i in range(len(moment.action_names))]
     values = moment.decomposition.components.ravel()
     decimals = max(decimals_for(values), decimals_to_tell(moment.q_values))
     rows = [
         row(name, moment.components(name), moment.q_value(name), moment.total(name), note, decimals)
-        for name, note in zip(moment.action_names, _notes(moment), strict=True)
+        for name, note in zip(moment.action_names, notes, strict=True)
     ]
     styles = {name: "dim" for name in moment.action_names if name not in (action, foil)}
     if foil is not None:
-        gap, q_gap = moment.difference(action, foil), _gap(moment, action, foil)
+        gap = moment.difference(action, foil)
+        q_gap = float(difference(moment.q_value(action), moment.q_value(foil)))
         total = moment.total(action) - moment.total(foil)
         decimals = max(decimals, decimals_for(gap), decimals_for([q_gap]))
         name = f"{action} − {foil}"
@@ -63,21 +65,10 @@ def action_table(choice: Choice) -> Table | None:
     return Table(heading, tuple(rows), sides, styles, axis.num_components)
 
 
-def _gap(moment: Moment, action: str, foil: str) -> float:
-    a, b = moment.q_value(action), moment.q_value(foil)
-    return 0.0 if same(a, b) else a - b
-
-
-def _notes(moment: Moment) -> list[str]:
-    """Returns what stands beside each action: how likely it is chosen, or that it goes nowhere."""
-    nothing = [0.0] * len(moment.action_names)
-    chances = nothing if moment.policy is None else moment.policy.tolist()
-    return [
-        _note(chance, stays) for chance, stays in zip(chances, moment.stays or nothing, strict=True)
-    ]
-
-
-def _note(chance: float, stays: float) -> str:
+def _note(moment: Moment, i: int) -> str:
+    """Returns what stands beside an action: how likely it is chosen, or that it goes nowhere."""
+    chance = 0.0 if moment.policy is None else float(moment.policy[i])
+    stays = moment.stays[i] if moment.stays else 0.0
     if chance > 0.0:
         return "chosen" if chance > 0.9995 else f"chosen {100 * chance:.0f} %"
     return "stays here" if stays >= 1.0 - 1e-9 else "mostly stays" if stays > 0.5 else ""

@@ -52,11 +52,9 @@ def evaluation_page(evaluation: Evaluation, *, width: int | None = None) -> Text
 
 def _cut_off(evaluation: Evaluation) -> str:
     """Returns how many episodes were cut off, and after how many steps where all were alike."""
-    cut, limit = int(evaluation.truncated.sum()), evaluation.max_steps
-    told = f"{cut} of {len(evaluation.lengths)} were cut off"
-    if not cut or limit is None or (evaluation.lengths[evaluation.truncated] != limit).any():
-        return told if cut else ""
-    return f"{told} at step {limit:,}"
+    cut, limit = evaluation.lengths[evaluation.truncated], evaluation.max_steps
+    at = f" at step {limit:,}" if limit is not None and (cut == limit).all() else ""
+    return f"{len(cut)} of {len(evaluation.lengths)} were cut off{at}" if len(cut) else ""
 
 
 def runs_page(runs: Sequence[RunSummary], *, width: int | None = None) -> Text:
@@ -72,13 +70,14 @@ def runs_page(runs: Sequence[RunSummary], *, width: int | None = None) -> Text:
 
 def _row(run: RunSummary) -> tuple[Row, str]:
     """Returns the cells of a run, and what is wrong with it, if anything is."""
-    name, fault = run.path.name, run.fault
+    name = run.path.name
+    unreadable = (name, "", "", "", "", "", "cannot be read")
+    if run.fault:
+        return unreadable, run.fault
     try:
-        settings = None if fault else TrainSettings.from_config(run.config, "Its config.toml")
+        settings = TrainSettings.from_config(run.config, "Its config.toml")
     except InputError as error:
-        settings, fault = None, str(error)
-    if settings is None:
-        return (name, "", "", "", "", "", "cannot be read"), fault or ""
+        return unreadable, str(error)
     score = run.metrics.get("score")
     steps = max(run.step or 0, run.metrics.get("agent_steps", 0))
     told = "" if score is None else _number(score, _decimals(score))

@@ -128,7 +128,7 @@ def test_foils_of_an_exact_table_are_predicted_without_bias():
         environments = ModelEnvironments(DRONE.mdp, 200, seed=seed)
         branches = branching.along(environments, every=2, foils=True, seed=seed)
         assert set(branches.actions.tolist()) == {0, 1, 2, 3}
-        found = calibrate(branches.samples)
+        found = calibrate(branches)
         covered.append(inside(found.bias, np.zeros(13)))
         assert found.skill.low[1] > 0.2
     assert np.mean(covered) >= 0.9

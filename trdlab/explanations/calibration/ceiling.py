@@ -7,7 +7,6 @@ import numpy as np
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
 from trdlab.rollouts.branches import Branches
-from trdlab.rollouts.realised import per_episode
 from trdlab.statistics import Estimates, by_episode
 
 
@@ -45,17 +44,17 @@ def ceiling_of(branches: Branches, *, seed: int = 0) -> Ceiling:
 
     Source: the one-way random-effects analysis of variance, Fisher (1925).
     """
-    moments, n, known = len(branches.actions), branches.copies, branches.known
+    n, moments = branches.copies, len(branches) // branches.copies
     if n < 2 or moments < 2:
         raise InputError(
             f"There are {moments} moments, continued {n} times each.",
             "A ceiling needs at least 2 of both.",
         )
-    observed = np.where(known[:, None], branches.observed, 0.0)  # [M, n, N+1]
+    observed = branches.observed.reshape(moments, n, -1)  # [M, n, N+1], 0 if not known
+    known = branches.known[::n]  # [M, N+1]
     mean = np.where(known, observed.mean(axis=1) - observed.mean(axis=(0, 1)), 0.0)  # [M, N+1]
     parts = (known.astype(np.float64), mean, mean**2, observed.var(axis=1, ddof=1))
-    of, count = branches.episode, branches.num_episodes
-    sums = np.stack([per_episode(part, of, count) for part in parts], axis=1)  # [E, 4, N+1]
+    sums = np.stack([branches.per_episode(part, n) for part in parts], axis=1)  # [E, 4, N+1]
     scale = np.abs(observed).max(axis=(0, 1)) ** 2  # [N+1]
 
     def skill(pooled: FloatArray) -> FloatArray:  # [R, 4, N+1] to [R, N+1]

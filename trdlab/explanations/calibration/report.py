@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
@@ -15,7 +16,6 @@ from trdlab.explanations.calibration.errors import MIN_DISCOUNT, Errors, errors_
 from trdlab.explanations.calibration.residual import Residual, residual_of
 from trdlab.printable import Printable
 from trdlab.rollouts.branches import Branches
-from trdlab.rollouts.counterfactual import Seen
 from trdlab.rollouts.episodes import Episode, distinct
 from trdlab.rollouts.realised import pool
 from trdlab.statistics import FEWEST_EPISODES, Estimate, bootstrap
@@ -131,12 +131,12 @@ class CalibrationReport(Printable):
         return self.calibration.time_axis
 
     @property
-    def seen(self) -> Seen:
-        """What two actions that are tried have to be held against."""
+    def seen(self) -> tuple[FloatArray, bool | None]:
+        """What two actions that are tried have to be held against (see `compared`)."""
         ranges = [of.observed_range for of in (self.calibration, self.foils) if of is not None]
         least, most = np.stack(ranges).min(axis=0)[0], np.stack(ranges).max(axis=0)[1]
         unless = None if self.ceiling is None else not self.ceiling.deterministic
-        return Seen(np.stack([least, most]), self.chance or unless)
+        return np.stack([least, most]), self.chance or unless
 
 
 def judge(
@@ -183,7 +183,7 @@ def judge(
         errors=errors_of(samples, seed=seed) if has_neighbours else None,
         consistency=consistency_of(episodes, seed=seed) if axis.horizon else None,
         ceiling=None if branches is None else ceiling_of(branches, seed=seed),
-        foils=None if foils is None else calibrate(foils.samples, seed=seed),
+        foils=None if foils is None else calibrate(foils, seed=seed),
         scale=max(float(np.abs(of.decomposition.components).max()) for of in episodes),
         chance=_has_chance(episodes) or any(of.shared_chance for of in copies),
         seconds_per_step=seconds_per_step,

@@ -32,10 +32,10 @@ from trdlab.explanations.moment.exact import tabular_moment
 from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty
 from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld, load_map, parse_map
-from trdlab.show.plots import figure as figure_of
 from trdlab.show.plots import style
 from trdlab.show.plots.bars import CUT, plot_components
 from trdlab.show.plots.figures import explanation_figure
+from trdlab.show.plots.figures import figure as figure_of
 from trdlab.show.plots.map import plot_map, solved_figure
 from trdlab.show.plots.moment import (
     moment_figure,
@@ -337,7 +337,8 @@ def test_pictures_need_no_pyplot_and_no_backend_of_the_users(tmp_path: Path):
         "import sys\n"
         "from pathlib import Path\n"
         "from trdlab.gridworld import Gridworld, load_map, parse_map\n"
-        "from trdlab.show.plots import figure, save\n"
+        "from trdlab.show.plots.figures import figure\n"
+        "from trdlab.show.plots.style import save\n"
         "picture = figure(Gridworld(load_map('drone')))\n"
         "save(picture, Path(sys.argv[1]))\n"
         "assert picture._repr_png_().startswith(b'\\x89PNG')\n"

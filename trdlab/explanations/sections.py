@@ -43,9 +43,9 @@ class Section:
         }
 
 
-def at_first(claims: Sequence[Claim], most: int = MOST_AT_FIRST) -> tuple[Claim, ...]:
+def at_first(claims: Sequence[Claim]) -> tuple[Claim, ...]:
     """Returns the claims that are told where nobody has asked for details: each once, no more."""
     told: dict[str, Claim] = {}
     for claim in claims:
         told.setdefault(claim.sentence, claim)
-    return tuple(told.values())[:most]
+    return tuple(told.values())[:MOST_AT_FIRST]

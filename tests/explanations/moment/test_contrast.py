@@ -68,7 +68,7 @@ def test_the_action_is_what_the_policy_does_even_if_that_is_to_stay():
     assert of.action != "right"
     assert of.foil == "right"
     assert said(of, "decided-at") == [
-        f"What comes at once decides: {of.action} pays nothing then and right costs 1."
+        f"What comes at once decides: {of.action} gains nothing then and right loses 1."
     ]
 
 

@@ -127,12 +127,7 @@ _KINDS: dict[Status, tuple[str, str]] = {
 
 
 def verdicts(report: CalibrationReport, whose: str = OWN) -> list[Claim]:
-    """Returns all that is to be said of some forecasts, by when it comes.
-
-    Args:
-        report: that has judged them.
-        whose: `OWN` or `OTHERS`.
-    """
+    """Returns all that is to be said of `OWN` forecasts, or those of `OTHERS`, by when it comes."""
     found = [claim for claim in every(report, *judged) if claim.whose == whose]
     return sorted(found, key=lambda claim: claim.span)
 

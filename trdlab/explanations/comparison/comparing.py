@@ -71,7 +71,7 @@ def compare(
     return compared(
         visits,
         names=(first.name, second.name),
-        words=(_words(first), _words(there)),
+        words=tuple(() if of.origin is None else of.origin.words for of in players),
         place=first.origin.place if first.origin else (),
         action_names=first.action_names,
         futures=(first.estimator.future, second.estimator.future),
@@ -81,8 +81,3 @@ def compare(
         seconds_per_step=first.seconds_per_step,
         seed=seed,
     )
-
-
-def _words(agent: Agent) -> tuple[str, ...]:
-    """Returns what names an agent on the command line, if it has such a name."""
-    return agent.origin.words if agent.origin else ()

@@ -49,19 +49,18 @@ class Story:
         return Section("episode", f"The episode with seed {seed}", self.claims)
 
 
-def tell(played: Played, *, moments: int = MOMENTS) -> Story:
-    """Returns the story of an episode, with so many moments at most."""
+def tell(played: Played) -> Story:
+    """Returns the story of an episode, with `MOMENTS` at most."""
     broken = broken_promises(played)[:1]
-    told = [*broken, *foreseen(played)[:1]][:moments]
+    told = [*broken, *foreseen(played)[:1]]
     goes_on = not played.episode.terminated  # past what was seen, so its last step ends no promise
     cut = len(played.episode) - 1 if goes_on else None
     stays = [range(of.first, of.last + (of.last == cut)) for of in broken]
-    rows = key_rows(played, moments - len(told), *stays)
+    rows = key_rows(played, MOMENTS - len(told), *stays)
     surprises = [surprise(played, row) for row in rows]
     large = bool(rows) and sizes(played)[rows[0]] > STANDS_OUT * played.scale
     most = (*broken, *(surprises[:1] if large else ()))
-    is_calm = not surprises and not broken
-    calm = every(played, *changed) if is_calm else []
+    calm = every(played, *changed) if not surprises and not broken else []
     return Story(
         played=played,
         start=tuple(every(played, *expected)),

@@ -20,8 +20,6 @@ from trdlab.show.plots.bars import Scale, plot_components, scale_of, settled
 from trdlab.tabular import ExactTable
 from trdlab.time_axis import axis_title
 
-__all__ = ["moment_figure", "plot_action", "plot_components", "plot_contrast", "plot_moment"]
-
 Range = tuple[float, float]  # the least and the largest value that is possible
 ANY: Range = (-np.inf, np.inf)
 

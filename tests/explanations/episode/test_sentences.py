@@ -124,7 +124,7 @@ def episodes(draw: st.DrawFn) -> Played:
 def mutations(sentence: str, names: tuple[str, ...] = NAMES) -> list[str]:
     """Returns the sentence with each number changed in its last digit, other words and names."""
     result = [*mutants.numbers(sentence), *mutants.words(sentence, WORDS)]
-    named = re.match(rf"(?:After )?({'|'.join(names)}) at step", sentence, re.IGNORECASE)
+    named = re.match(rf"At step [\d,]+, ({'|'.join(names)}) ", sentence, re.IGNORECASE)
     if named:
         others = [name for name in ("sideways", *names) if name.lower() != named[1].lower()]
         result += [sentence.replace(named[1], name, 1) for name in others]
@@ -210,7 +210,7 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
 
 def test_a_story_reads_well():
     assert said(tell(real()[0]).claims) == [
-        "At the start the agent expected rewards worth 3.52.",
+        "At the start the agent expected 3.52 in all.",
         "A reward of 1 at step 3 was foreseen 3 steps before, as early as it can be told.",
         "No step brought a surprise.",
         "The episode ended after 5 steps.",

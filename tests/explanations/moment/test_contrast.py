@@ -68,7 +68,7 @@ def test_the_action_is_what_the_policy_does_even_if_that_is_to_stay():
     assert of.action != "right"
     assert of.foil == "right"
     assert said(of, "decided-at") == [
-        f"What comes at once decides: {of.action} gains nothing then and right loses 1."
+        f"What comes at once decides: {of.action} gains nothing and right loses 1."
     ]
 
 
@@ -89,7 +89,7 @@ def test_to_fall_off_a_cliff_is_no_bump():
     (decided,) = of_kind(of, "decided-at")
     assert decided.component == 0
     assert (
-        decided.sentence == "What comes at once decides: up gains nothing then and right loses 100."
+        decided.sentence == "What comes at once decides: up gains nothing and right loses 100."
     )
 
 
@@ -190,7 +190,7 @@ def pair(a: list[float], b: list[float], **known: Any) -> Choice:
         (
             [0] * 9 + [2, 0],
             [0] * 11,
-            "What comes 9 steps later decides: a gains 2 then and b gains nothing, on average.",
+            "What comes 9 steps later decides: a gains 2 and b gains nothing, on average.",
         ),
         (
             [0] * 9 + [1, 1, 0, 0],

@@ -102,9 +102,9 @@ def test_what_came_on_the_ledge_agrees_with_the_exact_values():
     assert in_all.startswith(
         "500 tries of each are too few to tell whether right is worth more than up; about "
     )
-    assert now.startswith("When tried, 2 steps later right gained 0.6")
+    assert now.startswith("When tried, 2 steps later, right gained 0.6")
     assert now.endswith("more than up; the forecast, 0.658, fits.")
-    assert later.startswith("When tried, 3 steps later up gained 0.")
+    assert later.startswith("When tried, 3 steps later, up gained 0.")
     assert later.endswith("more than right; the forecast, 0.5, fits.")
     assert often == "Right and up were each tried 500 times from here."
 
@@ -113,7 +113,7 @@ def test_without_chance_it_says_so_and_gives_no_interval():
     trial = try_out(gridworld_agent("drone", AXIS), "down", "up", copies=3)
     assert [claim.sentence for claim in told(trial)] == [
         "As forecast, down was worth 0.266 more than up.",
-        "As forecast, 1 step later down gained 0.95 more than up.",
+        "As forecast, 1 step later, down gained 0.95 more than up.",
         "Down and up were each tried 3 times from here; each gave the same result every time.",
     ]
 
@@ -158,7 +158,7 @@ def test_a_false_promise_is_found_out():
     false = next(claim for claim in told(trial) if claim.kind == "against-the-forecast")
     assert (false.more, false.less, false.component) == ("up", "right", 2)
     assert false.sentence.startswith(
-        "The forecast was wrong: up was to be 1.34 ahead, but 2 steps later right gained 0.6"
+        "The forecast was wrong: up was to be 1.34 ahead, but 2 steps later, right gained 0.6"
     )
     assert false.sentence.endswith(" more.")
 

@@ -86,7 +86,9 @@ _FEW = "For {span:comes}, {whose:text} were tested in only {few:text}"
 )
 def judged(report: CalibrationReport) -> Found:
     cut = "episodes were cut off before" if report.judged.truncated else "no episode shows it"
-    unseen = "in the test, random actions always came first" if report.judged.epsilon > 0.0 else cut
+    unseen = (
+        "before that, the test always took a random action" if report.judged.epsilon > 0.0 else cut
+    )
     yield from _verdicts(OWN, report.calibration, unseen)
     if report.foils is not None:
         yield from _verdicts(OTHERS, report.foils, "no copy was played that long")

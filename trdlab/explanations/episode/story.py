@@ -13,6 +13,7 @@ from trdlab.explanations.rules import Claim, Found, every
 from trdlab.explanations.sections import Section
 
 MOMENTS = 5  # of an episode are told
+MOST = 0.5  # of what is expected: a component with a larger share is named
 
 # a surprise is measured as a share of `Played.scale`
 SHARE = 0.05  # a larger one is told
@@ -97,9 +98,8 @@ def key_rows(played: Played, count: int, *told: range) -> list[int]:
     {
         "expected-nothing": "At the start the agent expected no rewards.",
         "expected-in-all": "At the start the agent expected {value:number} in all.",
-        "expected-at-start": "At the start the agent expected {value:rewards}.",
         "expected-mostly": (
-            "At the start the agent expected {value:rewards}, most of it {component:when}."
+            "At the start the agent expected {value:number} in all, most of it {component:when}."
         ),
     }
 )
@@ -108,12 +108,10 @@ def expected(played: Played) -> Iterator[Found]:
     value = {"value": float(row.sum())}
     if not row.any():
         yield "expected-nothing", {}
-    elif len(row) == 1 or not one_sign(row):
-        yield "expected-in-all", value
-    elif np.abs(row).max() <= 0.5 * np.abs(row).sum():
-        yield "expected-at-start", value
-    else:
+    elif len(row) > 1 and one_sign(row) and np.abs(row).max() > MOST * abs(row.sum()):
         yield "expected-mostly", value | {"component": int(np.abs(row).argmax())}
+    else:
+        yield "expected-in-all", value
 
 
 @EPISODES.kinds(

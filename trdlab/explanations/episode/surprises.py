@@ -11,7 +11,7 @@ from trdlab.explanations.rules import Claim, Fields, Found
 FOCUS = 1 / 3  # of a surprise: what one component must account for, to be named as its reason
 NEARLY = 1 / 4  # of what moved from one step to another: how far signs may be mixed there
 
-_TURNED = "{action} at {step:step} turned out {gap:number} {outcome:text} than expected"
+_TURNED = "At {step:step}, {action} turned out {gap:number} {outcome:text} than expected"
 _ALIKE = "in all, it expects about as much as before."
 _SAYS = {
     "turned-out": f"{_TURNED}.",  # there is no explicit component, so nothing is known of when
@@ -30,15 +30,15 @@ _SAYS = {
         f"{_TURNED}, spread over many steps: half of it up to {{by:step}}."
     ),
     "put-off": (
-        "{action} at {step:step} delayed {worth:rewards}: they were to come {origin:at}, and now "
+        "At {step:step}, {action} delayed {worth:rewards}: they were to come {origin:at}, and now "
         f"{{to:at}}; {_ALIKE}"
     ),
     "brought-forward": (
-        "{action} at {step:step} brought {worth:rewards} forward: they were to come {origin:at}, "
+        "At {step:step}, {action} brought {worth:rewards} forward: they were to come {origin:at}, "
         f"and now {{to:at}}; {_ALIKE}"
     ),
     "exchanged": (
-        "{action} at {step:step} gained {gain:number} {up:at} and lost {loss:number} "
+        "At {step:step}, {action} gained {gain:number} {up:at} and lost {loss:number} "
         f"{{down:at}}; {_ALIKE}"
     ),
 }

@@ -170,7 +170,7 @@ def untested_difference(choice: Choice) -> Iterator[Fields]:
 
 
 @CHOICES.rule(
-    "What comes {component:when} decides: {better} {better_sum:gains} then and {worse} "
+    "What comes {component:when} decides: {better} {better_sum:gains} and {worse} "
     "{worse_sum:gains}{averages:averages}."
 )
 def decided_at(choice: Choice) -> Iterator[Fields]:

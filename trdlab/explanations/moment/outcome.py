@@ -62,14 +62,14 @@ def _forms(trial: Trial) -> dict[str, Form]:
 
     def at(component: int | None, digits: int) -> str:
         if component is not None:
-            return forms["when"].show(component, digits) + " "
-        return "" if whole else forms["within"].show(axis.num_steps - 1, digits) + " "
+            return forms["when"].show(component, digits) + ", "
+        return "" if whole else forms["within"].show(axis.num_steps - 1, digits) + ", "
 
-    def does(worth: str, gains: str) -> Form:
-        return Form(lambda component, _: worth if component is None and whole else gains)
+    def does(in_all: str, of_a_part: str) -> Form:
+        return Form(lambda component, _: in_all if component is None and whole else of_a_part)
 
-    is_worth = {"gained": does("was worth", "gained"), "gains": does("is worth", "gains")}
-    return forms | is_worth | {"at": Form(at)}
+    gained, leads = does("was worth", "gained"), does("is worth more than", "is ahead of")
+    return forms | {"at": Form(at), "gained": gained, "leads": leads}
 
 
 TRIALS = Language[Trial]("this trial", _forms)
@@ -111,10 +111,10 @@ _MORE = "{component:at}{more} {component:gained} %s more than {less}"
         ),
         "too-few-tries": (
             "{copies:count} tries of each are too few to tell whether {component:at}{more} "
-            "{component:gains} more than {less}; about {enough:count} would do."
+            "{component:leads} {less}; about {enough:count} would do."
         ),
         "too-close-to-tell": (
-            "Tries cannot tell whether {component:at}{more} {component:gains} more than {less}: "
+            "Tries cannot tell whether {component:at}{more} {component:leads} {less}: "
             "they are too close."
         ),
     }

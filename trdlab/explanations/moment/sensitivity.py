@@ -171,7 +171,11 @@ def searched(choice: Choice) -> Iterator[Fields]:
     """Two changes between two neighbouring values can be missed."""
     found = [of for of, *_ in _found(choice)]
     if found:
-        ranges = tuple(f"{of.name} from {plain(of.low)} to {plain(of.high)}" for of in found)
+        ends = [sorted((abs(of.low), abs(of.high))) for of in found]  # a cost is a positive number
+        ranges = tuple(
+            f"{of.name} from {plain(least)} to {plain(most)}"
+            for of, (least, most) in zip(found, ends, strict=True)
+        )
         each = " of each" if len(ranges) > 1 else ""
         yield {"samples": SAMPLES + 1, "of": each, "ranges": ranges}
 

@@ -147,6 +147,9 @@ def test_arguments_change_the_environment(capsys: pytest.CaptureFixture[str]):
     assert large["environment"]["num_states"] == 64
     assert large["environment"]["arguments"]["success_rate"] == 0.8
     assert large["environment"]["time_limit"] == 100
+    own = loaded(capsys, "FrozenLake-v1", "--env-arg", 'desc=["SFG", "FHF"]')
+    assert own["environment"]["num_states"] == 6
+    assert "map_name" not in own["environment"]["arguments"]  # it is another map
 
 
 def test_what_flips_the_preference_does(capsys: pytest.CaptureFixture[str]):

@@ -70,7 +70,7 @@ def gridworld(
         assert isinstance(solved.world, Gridworld)
         treasures = [source.value for source in solved.world.sources if source.kind == "treasure"]
         if treasures and treasure is None and state == "0":
-            richer = common.command([base], {"--treasure": treasures[0] + 1.0})
+            richer = common.command([base], {"--treasure": 1.25 * treasures[0] or 1.0})
             return f"{richer} --N {axis.horizon}"
         return f"{base} --N {2 * axis.horizon + 2} (a longer horizon)"
 

@@ -1,6 +1,6 @@
 """Tables of a page: what each action is worth, as the cells that text and HTML lay out."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from trdlab.arrays import FloatArray, same
@@ -42,19 +42,21 @@ def action_table(choice: Choice) -> Table | None:
 
     def row(name: str, components: FloatArray, q: float, total: float, note: str, of: int) -> Row:
         values = (number(float(value), of) for value in (*components, q))
-        return (name, *values, *[amount(total)] * has_totals, note)
+        return (name, *values, *[amount(total, of_totals)] * has_totals, note)
 
     values = moment.decomposition.components.ravel()
     decimals = max(decimals_for(values), decimals_to_tell(moment.q_values))
+    of_totals = decimals_to_tell(map(moment.total, moment.action_names))
     rows = [
         row(name, moment.components(name), moment.q_value(name), moment.total(name), note, decimals)
         for name, note in zip(moment.action_names, _notes(moment), strict=True)
     ]
     styles = {name: "dim" for name in moment.action_names if name not in (action, foil)}
     if foil is not None:
-        gap, q_gap = moment.difference(action, foil), _gap(moment, action, foil)
-        total = moment.total(action) - moment.total(foil)
+        gap, q_gap = moment.difference(action, foil), _gap(moment.q_value, action, foil)
+        total = _gap(moment.total, action, foil)
         decimals = max(decimals, decimals_for(gap), decimals_for([q_gap]))
+        of_totals = max(of_totals, decimals_for([total]))
         name = f"{action} − {foil}"
         rows.append(row(name, gap, q_gap, total, "", decimals))
         styles[name] = "italic"
@@ -63,8 +65,8 @@ def action_table(choice: Choice) -> Table | None:
     return Table(heading, tuple(rows), sides, styles, axis.num_components)
 
 
-def _gap(moment: Moment, action: str, foil: str) -> float:
-    a, b = moment.q_value(action), moment.q_value(foil)
+def _gap(of: Callable[[str], float], action: str, foil: str) -> float:
+    a, b = of(action), of(foil)
     return 0.0 if same(a, b) else a - b
 
 

@@ -136,8 +136,7 @@ def _flips_there(choice: Choice, **claimed: Any) -> bool:
 
 
 @CHOICES.rule(
-    "{worse} would be better if {quantity:text} {were:text} {at:names} instead of "
-    "{present:number}.",
+    "{worse} would be better if {quantity:text} {were:text} {at:names} instead of {present:given}.",
     holds=_flips_there,
 )
 def flips(choice: Choice) -> Iterator[Fields]:

@@ -79,6 +79,14 @@ class Gridworld:
     def __str__(self) -> str:
         return "\n".join(self.grid.rows)
 
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        from trdlab.gridworld.ansi import legend
+
+        lines = "\n".join([str(self), "", *legend(self)[1:]])  # the drone is not drawn
+        return f"<pre>{escape(lines)}</pre>"
+
     def __init__(self, grid: GridMap) -> None:
         self.grid = grid
         self.sources = _sources(grid)

@@ -84,6 +84,9 @@ def test_states_are_named_by_number_or_place(capsys: pytest.CaptureFixture[str])
     _, by_number, _ = run(capsys, "gridworld", "--state", "1", "--json")
     _, by_place, _ = run(capsys, "gridworld", "--state", "0,0", "--json")
     assert by_number == by_place
+    _, over, _ = run(capsys, "gridworld", "--state", "0,4")  # where the treasure was
+    assert "The episode is over here: no action pays anything any more." in over
+    assert "Try:" not in over
 
 
 def test_ties_are_said_and_can_be_mixed(capsys: pytest.CaptureFixture[str]):

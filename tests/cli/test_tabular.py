@@ -184,6 +184,7 @@ def test_states_in_which_episodes_are_over_are_said(capsys: pytest.CaptureFixtur
         assert note in run(capsys, *words)[1]
         assert not loaded(capsys, *words)["state"]["visited"]
     assert over not in run(capsys, "FrozenLake-v1")[1]
+    assert "Try:" not in run(capsys, "FrozenLake-v1", "--state", "5")[1]  # nothing comes later
 
 
 def test_ties(capsys: pytest.CaptureFixture[str]):

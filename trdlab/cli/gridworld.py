@@ -29,7 +29,12 @@ def gridworld(
         float | None, typer.Option("--treasure", help="What treasures pay.")
     ] = None,
     state: Annotated[
-        str, typer.Option("--state", metavar="NUMBER|ROW,COLUMN", help="The state to explain.")
+        str,
+        typer.Option(
+            "--state",
+            metavar="NUMBER|ROW,COLUMN",
+            help="The state to explain; 2,3,1 is row 2, column 3 with 1 collected.",
+        ),
     ] = "0",
     action: common.Action = None,
     foil: common.Foil = None,
@@ -64,6 +69,8 @@ def gridworld(
 
     def further(solved: SolvedState) -> str:
         """Returns a command that shows something new about this very map, all else being equal."""
+        if solved.choice.moment.is_over:
+            return ""
         base = common.command(["gridworld", "--map", map_name, "--gamma", gamma], given)
         if axis.width > 1:
             return f"{base} --N {axis.num_steps} --w 1 (the same steps one by one)"

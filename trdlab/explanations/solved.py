@@ -60,7 +60,7 @@ def solve_gridworld(
         time_axis: γ, N and w.
         slip: a slip probability to use in place of the map's own.
         treasure: what treasures pay, in place of the map's own.
-        state: the number of a state, or `row,column`.
+        state: the number of a state, `row,column` or `row,column,collected`.
         action: the action to explain, by default what the policy does.
         foil: the action to contrast it with, by default the best real alternative.
         ties: whose future is told where optimal actions tie.

@@ -431,6 +431,15 @@ def test_the_python_that_is_shown_runs(
     assert capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    "word",
+    ["Component", "Residual", "Q", "Total", "Chosen", "Stays here", "Mostly stays", "Tie", "Worth",
+     "In total", "The other action** (`--foil`)", "Skill", "trusted to t+3", "Not tested"],
+)  # fmt: skip
+def test_the_words_of_the_output_are_explained_on_one_page(word: str) -> None:
+    assert f"**{word}" in (ROOT / "docs" / "output.md").read_text(encoding="utf-8")
+
+
 def test_the_readme_shows_what_the_command_prints() -> None:
     """If this fails, paste what it prints now."""
     words = shlex.split("gridworld --gamma 0.95 --N 2 --w 2")

@@ -502,6 +502,14 @@ def test_a_page_may_link_to_the_network_and_load_its_own_files() -> None:
     assert hooks.on_post_page(html, page=None) == html
 
 
+def test_the_page_for_missing_pages_finds_its_files_on_disk_too() -> None:
+    html = '<head></head><link href="/assets/a.css"><script src="/assets/a.js"></script>'
+    shown = hooks.on_post_template(html, template_name="404.html")
+    assert '<link href="assets/a.css"><script src="assets/a.js">' in shown
+    assert "if (location.protocol !== 'file:')" in shown  # a server has a root
+    assert hooks.on_post_template(html, template_name="sitemap.xml") == html
+
+
 @pytest.mark.parametrize(("command", "ok"), [("trdlab --help", True), ("trdlab nonsense", False)])
 def test_a_command_that_fails_on_a_page_fails_the_build(
     tmp_path: Path, command: str, ok: bool

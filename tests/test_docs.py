@@ -431,6 +431,15 @@ def test_the_python_that_is_shown_runs(
     assert capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    "word",
+    ["Component", "Residual", "Q", "Total", "Chosen", "Stays here", "Mostly stays", "Tie", "Worth",
+     "In total", "The other action** (`--foil`)", "Skill", "trusted to t+3", "Not tested"],
+)  # fmt: skip
+def test_the_words_of_the_output_are_explained_on_one_page(word: str) -> None:
+    assert f"**{word}" in (ROOT / "docs" / "output.md").read_text(encoding="utf-8")
+
+
 def test_the_readme_shows_what_the_command_prints() -> None:
     """If this fails, paste what it prints now."""
     words = shlex.split("gridworld --gamma 0.95 --N 2 --w 2")
@@ -491,6 +500,14 @@ def test_a_page_that_loads_from_the_network_fails_the_build(loaded: str) -> None
 def test_a_page_may_link_to_the_network_and_load_its_own_files() -> None:
     html = '<a href="https://x.org"></a><script src="../a.js"></script><img src="a.png">'
     assert hooks.on_post_page(html, page=None) == html
+
+
+def test_the_page_for_missing_pages_finds_its_files_on_disk_too() -> None:
+    html = '<head></head><link href="/assets/a.css"><script src="/assets/a.js"></script>'
+    shown = hooks.on_post_template(html, template_name="404.html")
+    assert '<link href="assets/a.css"><script src="assets/a.js">' in shown
+    assert "if (location.protocol !== 'file:')" in shown  # a server has a root
+    assert hooks.on_post_template(html, template_name="sitemap.xml") == html
 
 
 @pytest.mark.parametrize(("command", "ok"), [("trdlab --help", True), ("trdlab nonsense", False)])

@@ -254,3 +254,14 @@ def test_what_holds_arrays_is_shown_in_one_line(name, shown):
     assert repr(noun).startswith(shown)
     assert len(repr(noun)) < 160
     assert str(agent.world).splitlines() == [">...T", "S####", ">cccC"]
+
+
+def test_notebooks_show_a_map_with_its_legend_and_a_table_where_it_begins():
+    agent = trdlab.agent("gridworld:ledge")
+    shown = agent.world._repr_html_()
+    assert shown.startswith("<pre>S..C\nHH..\n\nC coin 1 (ends)\n")
+    shown = trdlab.agent("gridworld:drone").estimator._repr_html_()
+    assert shown.startswith("<p>&lt;ExactTable: &lt;MDP: 14 states, 4 actions&gt; · ")
+    assert "(state 0)" in shown
+    down = ("0", "0.95", "0.90", "0.86", "0.81", "3.52")
+    assert "<tr>" + "".join(f"<td>{cell}</td>" for cell in down) + "</tr>" in shown

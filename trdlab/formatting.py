@@ -54,10 +54,10 @@ def number(value: float, decimals: int = 2) -> str:
 def amount(value: float, decimals: int | None = None) -> str:
     """Returns a reward as people write it: whole numbers without decimals.
 
-    >>> amount(4.0000000001), amount(4.327), amount(-1.0)
-    ('4', '4.33', '-1')
+    >>> amount(4.0000000001), amount(4.327), amount(-1.0), amount(4e-12)
+    ('4', '4.33', '-1', '4.00e-12')
     """
-    if math.isfinite(value) and abs(value) < _LARGEST_FIXED and abs(value - round(value)) < 1e-9:
+    if math.isfinite(value) and abs(value) < _LARGEST_FIXED and math.isclose(value, round(value)):
         return str(round(value))
     return number(value, decimals_for([value]) if decimals is None else decimals)
 

@@ -245,6 +245,30 @@ def test_a_moment_as_json_tells_its_errors_and_its_only_reward(explain, trained)
     assert json.loads(out)["moment"]["error"] is None
 
 
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (("explain", "gridworld:drone"), "drone"),
+        (("compare", "gridworld:drone", "gridworld:drone"), "drone-against-drone"),
+    ],
+)
+def test_what_began_at_once_gets_a_folder_of_its_own(trdlab, monkeypatch, words, name):
+    """Another process makes its folder while this one plays."""
+    folder, original = Path("explanations") / name, Playing.take
+
+    def take(self: Playing, *arguments: Any) -> Any:
+        folder.mkdir(parents=True, exist_ok=True)
+        return original(self, *arguments)
+
+    monkeypatch.setattr(Playing, "take", take)
+    code, _, err = trdlab(*words, "--episodes", 2)
+    pictures = [Path(line.removeprefix("Picture: ")) for line in err.splitlines()]
+    assert code == 0
+    assert {path.parent for path in pictures} == {Path("explanations") / f"{name}-2"}
+    assert all(path.exists() for path in pictures)
+    assert list(folder.iterdir()) == []
+
+
 def test_what_is_interrupted_leaves_nothing(explain, tmp_path, monkeypatch):
     taken = 0
 

@@ -84,6 +84,9 @@ def test_states_are_named_by_number_or_place(capsys: pytest.CaptureFixture[str])
     _, by_number, _ = run(capsys, "gridworld", "--state", "1", "--json")
     _, by_place, _ = run(capsys, "gridworld", "--state", "0,0", "--json")
     assert by_number == by_place
+    _, over, _ = run(capsys, "gridworld", "--state", "0,4")  # where the treasure was
+    assert "The episode is over here: no action pays anything any more." in over
+    assert "Try:" not in over
 
 
 def test_ties_are_said_and_can_be_mixed(capsys: pytest.CaptureFixture[str]):
@@ -103,6 +106,38 @@ def test_a_map_file(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     assert out.startswith("mine · Mine")
     assert "Up and down lead to the same rewards at the same times." in out
     assert f"Try: trdlab gridworld --map {path}" in " ".join(out.split())
+
+
+@pytest.mark.parametrize(
+    ("coin", "treasure", "totals", "flip", "richer"),
+    [
+        ("1e-12", "4e-12", ("1.00e-12", "4.00e-12", "3.00e-12"), "1.05e-12", "5e-12"),
+        ("1e+12", "1.001e+12", ("1.000e+12", "1.001e+12", "1.000e+09"), None, "1.25125e+12"),
+    ],
+)
+def test_amounts_of_any_size_are_told_apart(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    coin: str,
+    treasure: str,
+    totals: tuple[str, str, str],
+    flip: str | None,
+    richer: str,
+):
+    path = tmp_path / "mine.txt"
+    rules = f"X = coin {coin} terminal\nY = treasure {treasure} terminal\n"
+    steps = 2 if flip else 1  # to the treasure: 1e-12 / 0.95 = 1.05e-12
+    path.write_text(f"{rules}---\nXS{'.' * (steps - 1)}Y", encoding="utf-8")
+    _, out, _ = run(capsys, "gridworld", "--map", str(path))
+    assert f"X coin {coin} (ends)" in out
+    assert f"Y treasure {treasure} (ends)" in out
+    rows = {line.split("[")[0].strip(): line.split() for line in out.splitlines() if "[" in line}
+    assert rows["left"][-1] == totals[0]
+    assert totals[1] in rows["right"]
+    assert rows["right − left"][-1] == totals[2]
+    told = f"if the treasure paid less than {flip or coin} instead of {treasure}."
+    assert told in " ".join(out.split())
+    assert f"--treasure {richer} --N 4" in " ".join(out.split())
 
 
 def test_a_gamma_too_close_to_1_is_not_called_exact(capsys: pytest.CaptureFixture[str]):

@@ -147,6 +147,9 @@ def test_arguments_change_the_environment(capsys: pytest.CaptureFixture[str]):
     assert large["environment"]["num_states"] == 64
     assert large["environment"]["arguments"]["success_rate"] == 0.8
     assert large["environment"]["time_limit"] == 100
+    own = loaded(capsys, "FrozenLake-v1", "--env-arg", 'desc=["SFG", "FHF"]')
+    assert own["environment"]["num_states"] == 6
+    assert "map_name" not in own["environment"]["arguments"]  # it is another map
 
 
 def test_what_flips_the_preference_does(capsys: pytest.CaptureFixture[str]):
@@ -181,6 +184,7 @@ def test_states_in_which_episodes_are_over_are_said(capsys: pytest.CaptureFixtur
         assert note in run(capsys, *words)[1]
         assert not loaded(capsys, *words)["state"]["visited"]
     assert over not in run(capsys, "FrozenLake-v1")[1]
+    assert "Try:" not in run(capsys, "FrozenLake-v1", "--state", "5")[1]  # nothing comes later
 
 
 def test_ties(capsys: pytest.CaptureFixture[str]):

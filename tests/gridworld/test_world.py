@@ -224,6 +224,10 @@ def test_a_state_is_named_by_number_or_place():
     again = world.states.index(State(0, 0, frozenset({(0, 1)})))
     assert world.find_state(str(again)) == again
     assert str(world.states[again]) == "row 0, column 0, 1 collected"
+    assert world.find_state("0,0,1") == again
+    assert world.find_state("0,0,0") == 0
+    with pytest.raises(InputError, match=r"column 1 no state has 0 collected.*one of 1, 2"):
+        world_of("Scc.").find_state("0,1,0")
 
 
 @pytest.mark.parametrize(
@@ -231,11 +235,11 @@ def test_a_state_is_named_by_number_or_place():
     [
         ("3", "no state 3.*0 to 2"),
         ("9" * 5000, "no state 9+.*0 to 2"),
-        ("-1", "state is '-1'.*number, or row,column"),
-        ("1.0", "number, or row,column"),
-        ("0,", "number, or row,column"),
-        ("0,0,0", "number, or row,column"),
-        ("", "number, or row,column"),
+        ("-1", "state is '-1'.*number, row,column"),
+        ("1.0", "number, row,column"),
+        ("0,", "number, row,column"),
+        ("0,0,0,0", "number, row,column or row,column,collected"),
+        ("", "number, row,column"),
         ("1,0", r"never be at row 1, column 0.*rows 0 to 0 .* columns 0 to 3"),
         ("0,3", "never be at row 0, column 3"),  # a wall
         (f"0,{'9' * 5000}", "never be at"),

@@ -17,6 +17,7 @@ from trdlab.runs import (
     RunFolder,
     free_name,
     list_runs,
+    new_folder,
     read_config,
     save_checkpoint,
     to_toml,
@@ -102,6 +103,17 @@ def test_a_free_name(tmp_path):
 @pytest.fixture
 def run(tmp_path) -> RunFolder:
     return RunFolder.create(tmp_path / "breakout", CONFIG)
+
+
+def test_a_new_folder_is_made_for_one_alone(tmp_path):
+    assert new_folder(tmp_path / "new", "pong") == tmp_path / "new" / "pong"
+    assert new_folder(tmp_path / "new", "pong") == tmp_path / "new" / "pong-2"
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match=r"Cannot make the folder .*pong'"):
+        new_folder(tmp_path / "file", "pong")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    with pytest.raises(OutputError, match="Cannot make the folder"):
+        new_folder(tmp_path / "nowhere", "pong")
 
 
 def test_a_misspelt_run_gets_a_suggestion(run):

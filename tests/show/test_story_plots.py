@@ -1,5 +1,7 @@
 """The picture of an episode, short and long, with and without costs and trust."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
@@ -11,7 +13,9 @@ from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import tell
 from trdlab.rollouts.episodes import Episode
 from trdlab.show.plots import style
-from trdlab.show.plots.episode import plot_story, story_figure
+from trdlab.show.plots.episode import plot_actions, plot_story, story_figure
+
+AXIS = TimeAxis(0.95, 4)
 
 
 def played(total: int, axis: TimeAxis, *, cost: bool = False) -> Played:
@@ -58,6 +62,20 @@ def test_the_columns_are_steps_the_rows_are_steps_ahead_and_costs_have_a_colour(
         assert residual.get_clim() == (low, high)
         assert low == (-high if cost else 0.0)
         assert [label.get_text() for label in ax.get_yticklabels()][-2:] == ["t+3", "t+4…∞"]
+
+
+def test_actions_are_named_along_the_steps_where_there_is_room():
+    of = played(100, AXIS)
+    both = RewardDecomposition(np.repeat(of.episode.decomposition.components, 2, axis=1), AXIS)
+    taken = replace(of.episode, actions=np.repeat([0, 1, 0], [60, 2, 38]), decomposition=both)
+    of = replace(of, episode=taken, action_names=("wait", "jump"))
+    strip = plot_actions(Figure().subplots(), of)
+    assert [(text.get_text(), text.xy[0]) for text in strip.texts] == [
+        ("wait", 29.5),
+        ("wait", 80.5),
+    ]
+    labels = [text.get_text() for text in story_figure(tell(of)).legends[0].get_texts()]
+    assert labels[:2] == ["wait", "jump"]
 
 
 def test_moments_are_numbered_as_their_sentences_are():

@@ -77,6 +77,12 @@ def test_an_evaluation_in_numbers():
     assert "greedy, 5.0% random actions," in words(evaluation_page(evaluation([1.0], 0.05)))
 
 
+def test_episodes_that_are_all_alike_have_no_interval():
+    alike = words(evaluation_page(evaluation([10.0, 10.0])))
+    assert "mean return 10.0 interquartile mean 10.0 least and most 10.0 … 10.0" in alike
+    assert "1 episode, greedy" in words(evaluation_page(evaluation([1.0])))
+
+
 @pytest.mark.parametrize(
     ("returns", "mean"),
     [

@@ -445,4 +445,6 @@ def test_what_was_never_learned_is_told():
     visits = np.array([[5, 0], [3, 2], [0, 0]])
     partly = str(replace(learned, visits=visits))
     assert "No window began in state 2. Nor with state and action (0, 1)." in partly
+    only = str(replace(learned, visits=np.maximum(visits, [[0, 0], [0, 0], [1, 1]])))
+    assert "steps. No window began with state and action (0, 1). Nothing" in only
     assert str(replace(learned, visits=visits + 1)).endswith("windows of 1 steps.")

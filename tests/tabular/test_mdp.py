@@ -80,6 +80,11 @@ def test_a_start_and_arrays_that_do_not_fit_are_refused():
         MDP(**parts, num_actions=3)
     with pytest.raises(InputError, match="one entry per transition"):
         MDP(**parts | {"rewards": np.zeros(3)}, num_actions=2)
+    with pytest.raises(InputError, match=r"told by nan. Give True or False"):
+        MDP(**parts | {"terminated": np.array([0.0, np.nan])}, num_actions=2)
+    counted = MDP(**parts | {"terminated": np.array([0, 1])}, num_actions=2)
+    assert counted.terminal_states.tolist() == whole.terminal_states.tolist()
+    assert counted.continuation.tolist() == [1.0, 0.0]
 
 
 @pytest.mark.parametrize(

@@ -71,16 +71,17 @@ def compare(
         env=env,
         env_arguments=env_arguments or (),
     )
-    if out is None and not as_json:
-        from trdlab.runs import free_name
+    named = Path("explanations"), f"{agents[0].name}-against-{agents[1].name}"
+    is_named = out is None and not as_json
+    if is_named:
+        from trdlab.runs import free_name, new_folder
 
-        out = free_name(Path("explanations"), f"{agents[0].name}-against-{agents[1].name}")
+        out = free_name(*named)
     if out is not None:
         from trdlab.show.plots.comparison import NAME
         from trdlab.show.plots.style import check_pictures
 
-        path = out / NAME
-        check_pictures([path])
+        check_pictures([out / NAME])
     errors = Console(stderr=True, highlight=False)
     with EpisodeProgress(errors, "Getting ready") as progress:
         found = two.compare(
@@ -93,7 +94,8 @@ def compare(
         if hint := _further(found):
             common.print_line(f"Try: {hint}", "dim")
     if out is not None:
-        common.save_picture(found.plot(), path)
+        out = new_folder(*named) if is_named else out
+        common.save_picture(found.plot(), out / NAME)
 
 
 def _further(found: "Comparison") -> str:

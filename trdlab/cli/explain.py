@@ -92,10 +92,12 @@ def explain(
         env=env,
         env_arguments=env_arguments or (),
     )
-    if out is None and not parts and not as_json:
-        from trdlab.runs import free_name
+    named = Path("explanations"), found.name
+    is_named = out is None and not parts and not as_json
+    if is_named:
+        from trdlab.runs import free_name, new_folder
 
-        out = free_name(Path("explanations"), found.name)
+        out = free_name(*named)
     if out is not None:
         from trdlab.show.plots.figures import part_figure, picture_paths
         from trdlab.show.plots.style import check_pictures
@@ -120,6 +122,7 @@ def explain(
     else:
         common.print_page(explained, details=details)
     if out is not None:
+        out = new_folder(*named) if is_named else out
         for part, path in paths.items():
             if (figure := part_figure(explained, part)) is not None:
-                common.save_picture(figure, path)
+                common.save_picture(figure, out / path.name)

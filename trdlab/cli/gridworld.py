@@ -29,7 +29,12 @@ def gridworld(
         float | None, typer.Option("--treasure", help="What treasures pay.")
     ] = None,
     state: Annotated[
-        str, typer.Option("--state", metavar="NUMBER|ROW,COLUMN", help="The state to explain.")
+        str,
+        typer.Option(
+            "--state",
+            metavar="NUMBER|ROW,COLUMN",
+            help="The state to explain; 2,3,1 is row 2, column 3 with 1 collected.",
+        ),
     ] = "0",
     action: common.Action = None,
     foil: common.Foil = None,
@@ -64,13 +69,15 @@ def gridworld(
 
     def further(solved: SolvedState) -> str:
         """Returns a command that shows something new about this very map, all else being equal."""
+        if solved.choice.moment.is_over:
+            return ""
         base = common.command(["gridworld", "--map", map_name, "--gamma", gamma], given)
         if axis.width > 1:
             return f"{base} --N {axis.num_steps} --w 1 (the same steps one by one)"
         assert isinstance(solved.world, Gridworld)
         treasures = [source.value for source in solved.world.sources if source.kind == "treasure"]
         if treasures and treasure is None and state == "0":
-            richer = common.command([base], {"--treasure": 1.25 * treasures[0]})
+            richer = common.command([base], {"--treasure": 1.25 * treasures[0] or 1.0})
             return f"{richer} --N {axis.horizon} (a larger treasure)"
         return f"{base} --N {2 * axis.horizon + 2} (a longer horizon)"
 

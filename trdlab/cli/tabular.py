@@ -79,6 +79,8 @@ def tabular(
 
     def further(solved: SolvedState) -> str:
         """Returns a command that shows something new about this very environment."""
+        if solved.choice.moment.is_over:
+            return ""
         assert isinstance(solved.world, TabularWorld)
         varied = dict(arguments)
         new = [name for name in _VARIANTS if name in solved.world.arguments and name not in varied]

@@ -1,6 +1,6 @@
 """A gridworld as text."""
 
-from trdlab.formatting import amount
+from trdlab.formatting import plain
 from trdlab.gridworld.world import Gridworld
 
 DRONE = "@"
@@ -41,7 +41,7 @@ def legend(world: Gridworld) -> tuple[str, ...]:
             continue
         words: list[str] = [cell.kind]
         if cell.kind not in ("wall", "one-way"):
-            words += [amount(cell.value)] * bool(cell.value)
+            words += [plain(cell.value)] * bool(cell.value)
             words += ["each time"] * (cell.kind in ("hazard", "fountain") and not cell.terminal)
             words += ["(ends)"] * cell.terminal
         entries.append(f"{symbol} {' '.join(words)}")

@@ -20,7 +20,7 @@ from matplotlib.textpath import TextPath
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
-from trdlab.formatting import amount
+from trdlab.formatting import plain
 from trdlab.gridworld import icons
 from trdlab.gridworld.gridmap import Cell, GridMap
 from trdlab.gridworld.icons import Shape
@@ -166,7 +166,7 @@ def _number(
     value: float, place: Place, *, y: float = 0.0, width: float, height: float
 ) -> list[Paint]:
     """Returns a number centred at y in a cell, as tall as `height` unless that is too wide."""
-    text = _text(amount(value).replace("-", "−"))
+    text = _text(plain(value).replace("-", "−"))
     left, bottom, right, top = text.get_extents().extents
     scale = min(height / (top - bottom), width / (right - left))
     centre = np.array([left + right, bottom + top]) / 2

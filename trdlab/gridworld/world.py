@@ -79,6 +79,14 @@ class Gridworld:
     def __str__(self) -> str:
         return "\n".join(self.grid.rows)
 
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        from trdlab.gridworld.ansi import legend
+
+        lines = "\n".join([str(self), "", *legend(self)[1:]])  # the drone is not drawn
+        return f"<pre>{escape(lines)}</pre>"
+
     def __init__(self, grid: GridMap) -> None:
         self.grid = grid
         self.sources = _sources(grid)
@@ -127,30 +135,44 @@ class Gridworld:
     def find_state(self, text: str) -> int:
         """Returns the state that a user names: its number, or `row,column` with least collected.
 
+        A third number says how many have been collected there; of several such states, which
+        differ in what was collected, the first is meant.
+
         Raises:
             InputError: there is no such state.
 
         >>> from trdlab.gridworld.gridmap import load_map
-        >>> Gridworld(load_map("drone")).find_state("0,0")
-        1
+        >>> world = Gridworld(load_map("drone"))
+        >>> world.find_state("0,0"), str(world.states[world.find_state("2,2,2")])
+        (1, 'row 2, column 2, 2 collected')
         """
         parts = text.split(",")
-        if not 1 <= len(parts) <= 2 or not all(p.strip().isdecimal() for p in parts):
-            raise InputError(f"The state is '{text}'.", "Give its number, or row,column.")
+        if not 1 <= len(parts) <= 3 or not all(p.strip().isdecimal() for p in parts):
+            raise InputError(
+                f"The state is '{text}'.", "Give its number, row,column or row,column,collected."
+            )
         if len(parts) == 1:
             if len(parts[0]) < 10 and int(text) < len(self.states):
                 return int(text)
             raise InputError(
                 f"There is no state {text}.", f"States run from 0 to {len(self.states) - 1}."
             )
-        place = tuple(int(p) if len(p) < 10 else -1 for p in parts)
-        here = [s for s in self.states if s.place == place]
+        *place, count = [int(p) if len(p) < 10 else -1 for p in [*parts, "0"][:3]]
+        here = [s for s in self.states if s.place == tuple(place)]
         if not here:
             rows, columns = self.grid.shape
             raise InputError(
                 f"The drone can never be at row {parts[0]}, column {parts[1]}.",
                 f"The map has rows 0 to {rows - 1} and columns 0 to {columns - 1}; "
                 "name a cell it can reach.",
+            )
+        known = sorted({len(state.collected) for state in here})
+        if len(parts) == 3:
+            here = [state for state in here if len(state.collected) == count]
+        if not here:
+            raise InputError(
+                f"At row {parts[0]}, column {parts[1]} no state has {parts[2]} collected.",
+                f"Say one of {', '.join(map(str, known))}.",
             )
         return self._index[min(here, key=lambda s: (len(s.collected), self._index[s]))]
 

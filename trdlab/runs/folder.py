@@ -187,6 +187,24 @@ def free_name(parent: Path, stem: str) -> Path:
     return next(path for path in names if not path.exists() and not path.is_symlink())
 
 
+def new_folder(parent: Path, stem: str) -> Path:
+    """Makes a folder of the first free name, which is then this process's own.
+
+    Raises:
+        OutputError: it cannot be made.
+    """
+    while True:
+        path = free_name(parent, stem)
+        try:
+            path.mkdir(parents=True)
+        except OSError as error:
+            if not path.exists():  # else another process was quicker
+                cause = f"Cannot make the folder '{path}': {error.strerror or error}."
+                raise OutputError(cause, "Choose another folder.") from error
+        else:
+            return path
+
+
 def is_run(path: Path) -> bool:
     """Returns whether this is the folder of a run, be it torn."""
     return (path / MANIFEST).exists() or (path / CONFIG).exists()

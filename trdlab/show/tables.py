@@ -42,11 +42,12 @@ def action_table(choice: Choice) -> Table | None:
 
     def row(name: str, components: FloatArray, q: float, total: float, note: str, of: int) -> Row:
         values = (number(float(value), of) for value in (*components, q))
-        return (name, *values, *[amount(total)] * has_totals, note)
+        return (name, *values, *[amount(total, of_totals)] * has_totals, note)
 
     notes = [_note(moment, i) for i in range(len(moment.action_names))]
     values = moment.decomposition.components.ravel()
     decimals = max(decimals_for(values), decimals_to_tell(moment.q_values))
+    of_totals = decimals_to_tell(map(moment.total, moment.action_names))
     rows = [
         row(name, moment.components(name), moment.q_value(name), moment.total(name), note, decimals)
         for name, note in zip(moment.action_names, notes, strict=True)
@@ -54,9 +55,11 @@ def action_table(choice: Choice) -> Table | None:
     styles = {name: "dim" for name in moment.action_names if name not in (action, foil)}
     if foil is not None:
         gap = moment.difference(action, foil)
-        q_gap = float(difference(moment.q_value(action), moment.q_value(foil)))
-        total = moment.total(action) - moment.total(foil)
+        q_gap, total = (
+            float(difference(of(action), of(foil))) for of in (moment.q_value, moment.total)
+        )
         decimals = max(decimals, decimals_for(gap), decimals_for([q_gap]))
+        of_totals = max(of_totals, decimals_for([total]))
         name = f"{action} − {foil}"
         rows.append(row(name, gap, q_gap, total, "", decimals))
         styles[name] = "italic"

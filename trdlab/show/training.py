@@ -6,6 +6,7 @@ from rich.text import Text
 
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError
+from trdlab.explanations.words import counted
 from trdlab.formatting import decimals_for
 from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary, to_toml
@@ -29,12 +30,12 @@ def plan_page(plan: Plan) -> Text:
 
 
 def evaluation_page(evaluation: Evaluation, *, width: int | None = None) -> Text:
-    """Returns what an agent reached: means with intervals, and how the episodes ended."""
+    """Returns what an agent reached: means, intervals if episodes differ, and how they ended."""
     low, high = float(evaluation.returns.min()), float(evaluation.returns.max())
     decimals = _decimals(low, high)
 
     def estimate(name: str, of: Estimate) -> Row:
-        interval = f"95 % interval {_span(of.low, of.high, decimals)}"
+        interval = f"95 % interval {_span(of.low, of.high, decimals)}" if low < high else ""
         return name, _number(of.value, decimals), interval
 
     rows = (
@@ -45,7 +46,8 @@ def evaluation_page(evaluation: Evaluation, *, width: int | None = None) -> Text
     )
     table, width = Table(("", "", ""), rows, "<<<"), width or columns()
     random = f", {evaluation.epsilon:.1%} random actions" if evaluation.epsilon else ""
-    head = f"{len(evaluation.returns)} episodes, greedy{random}, seed {evaluation.seed}"
+    count = counted(len(evaluation.returns), "episode")
+    head = f"{count}, greedy{random}, seed {evaluation.seed}"
     lines = wrapped(f"{head}; raw rewards, undiscounted", width)
     return Text("\n").join([*lines, *table_lines(table, width)])
 

@@ -48,7 +48,8 @@ class LearnedTable:
             told += f" No window began in {_listed('state', np.flatnonzero(never).tolist())}."
         seldom = np.argwhere(self.unlearned & ~never[:, None]).tolist()
         if seldom:
-            told += f" Nor with {_listed('state and action', [tuple(pair) for pair in seldom])}."
+            pairs = _listed("state and action", [tuple(pair) for pair in seldom])
+            told += f" {'Nor' if never.any() else 'No window began'} with {pairs}."
         return told + " Nothing was learned of them." * bool(self.unlearned.any())
 
     @property

@@ -74,6 +74,7 @@ class MDP:
                 f"{', '.join(str(array.shape) for array in arrays)}.",
                 "Give one entry per transition.",
             )
+        object.__setattr__(self, "terminated", as_flags(self.terminated))
         if not np.isfinite(self.rewards).all() or not np.isfinite(self.probabilities).all():
             raise InputError("A reward or probability is not a finite number.", "Check the model.")
         if np.any(np.diff(self.offsets) <= 0):

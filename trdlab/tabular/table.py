@@ -41,6 +41,12 @@ class ExactTable:
     def __repr__(self) -> str:
         return f"<ExactTable: {self.mdp} · {self.time_axis} · {self.future.policy}>"
 
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        begins = f"{self}, where episodes begin (state {self.mdp.start}), an action in each row:"
+        return f"<p>{escape(begins)}</p>{self.decomposition[self.mdp.start]._repr_html_()}"
+
     @property
     def time_axis(self) -> TimeAxis:
         """What the components mean."""

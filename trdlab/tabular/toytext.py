@@ -45,11 +45,14 @@ def tabular_world(env: Any) -> TabularWorld:
         mdp.num_states
     ):
         words = {"action_names": tuple(f"action {i}" for i in range(mdp.num_actions))}
+    arguments = _defaults(type(base)) | dict(spec.kwargs if spec else {})
+    if arguments.get("desc") is not None:
+        arguments.pop("map_name", None)  # a map of one's own takes the place of a named one
     return TabularWorld(
         mdp,
         environment_name(env),
         **words,
-        arguments=_defaults(type(base)) | dict(spec.kwargs if spec else {}),
+        arguments=arguments,
         starts=start_distribution(env),
         time_limit=spec.max_episode_steps if spec else None,
     )

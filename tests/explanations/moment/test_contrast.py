@@ -88,9 +88,7 @@ def test_to_fall_off_a_cliff_is_no_bump():
     assert of.moment.stays[of.moment.index("left")] == 1.0
     (decided,) = of_kind(of, "decided-at")
     assert decided.component == 0
-    assert (
-        decided.sentence == "What comes at once decides: up gains nothing and right loses 100."
-    )
+    assert decided.sentence == "What comes at once decides: up gains nothing and right loses 100."
 
 
 def test_where_the_episode_is_over_that_is_all_there_is_to_say():
@@ -235,13 +233,37 @@ def test_crossings_are_found_at_their_step():
     ]
 
 
+def test_a_lead_that_begins_in_the_residual_is_not_denied():
+    """At t+4 right has paid -0.5 · (1 + γ + γ² + γ³) + 9.5 · γ⁴ = 5.88; N = 4 ends before."""
+    rules = "step_cost: 0.5\nX = coin 2 terminal\nY = coin 10\n---\n"
+    world = Gridworld(parse_map(f"{rules}XS>...Y{'.' * 29}E"))
+    near, far = (choice(world, TimeAxis(GAMMA, horizon), foil="right") for horizon in (4, 40))
+    assert near.action == far.action == "left"
+    assert said(near, "never-behind") == [
+        "Added up step by step, left is never behind right in the first 4 steps, nor in the end."
+    ]
+    assert not of_kind(far, "never-behind")
+    assert (
+        "After the first 5 steps right has overtaken left: added up, right gains 5.88 and left "
+        "gains 1.5." in said(far, "overtakes")
+    )
+
+
+def test_a_residual_in_which_an_action_pays_more_speaks_for_it():
+    of = choice("tie", TimeAxis(0.9, 1), action="left", foil="right")
+    texts = [claim.sentence for claim in told(of)]
+    assert texts[:2] == [  # 19 · 0.9 and 20 · 0.9²
+        "What comes after the first step decides: left pays 17.1 then and right pays 16.2.",
+        "In total right brings 20 and left 19.",
+    ]
+
+
 def test_an_equal_level_is_no_lead_and_the_residual_is_not_spoken_of_step_by_step():
     level = pair([1, 0, 0, 0], [0, 1, 0, 0])
     assert not of_kind(level, "overtakes")
     ahead = pair([1, 0, 0, 0.5], [0, 0.5, 0, 0])
     assert said(ahead, "never-behind") == [
-        "Added up step by step, a is never behind b, be it after a few steps, after the first 3 "
-        "steps or in the end."
+        "Added up step by step, a is never behind b in the first 3 steps, nor in the end."
     ]
     grouped = moment([[1, 0, 0.5], [0, 0.5, 0]], width=2).choice("a", "b")
     assert not of_kind(grouped, "never-behind")

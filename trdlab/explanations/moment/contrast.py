@@ -243,8 +243,7 @@ def turns(choice: Choice) -> Iterator[Found]:
 
 
 @CHOICES.rule(
-    "Added up step by step, {leader} is never behind {other}, be it after a few steps, after "
-    "{count:first} or in the end."
+    "Added up step by step, {leader} is never behind {other} in {count:first}, nor in the end."
 )
 def never_behind(choice: Choice) -> Iterator[Fields]:
     """Step by step its running total is no smaller, and larger in the end; w = 1."""

@@ -127,7 +127,7 @@ def _found(choice: Choice) -> tuple[tuple[WhatIf, str, str, tuple[float, ...]], 
 
 
 @CHOICES.rule(
-    "{worse} would be better if {quantity:text} {were:text} {at:names} instead of {present:number}."
+    "{worse} would be better if {quantity:text} {were:text} {at:names} instead of {present:given}."
 )
 def flips(choice: Choice) -> Iterator[Fields]:
     """The nearest values, below and above the present one, at which the other action is better."""

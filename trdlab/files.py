@@ -5,6 +5,7 @@ import json
 import os
 from collections.abc import Callable, Collection
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
@@ -58,6 +59,12 @@ def check_small_text(path: Path) -> None:
         raise InputError(f"'{path}' is a device.", "Name a text file.")
     if path.is_file() and (size := path.stat().st_size) > 1_000_000:
         raise InputError(f"'{path}' has {size:,} bytes.", "Name a text file, below a megabyte.")
+
+
+def free_name(parent: Path, stem: str) -> Path:
+    """Returns the first of `stem`, `stem-2`, `stem-3`, … that is not there yet."""
+    names = (parent / (stem if at == 1 else f"{stem}-{at}") for at in count(1))
+    return next(path for path in names if not path.exists() and not path.is_symlink())
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:

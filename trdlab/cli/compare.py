@@ -72,7 +72,7 @@ def compare(
         env_arguments=env_arguments or (),
     )
     if out is None and not as_json:
-        from trdlab.runs import free_name
+        from trdlab.files import free_name
 
         out = free_name(Path("explanations"), f"{agents[0].name}-against-{agents[1].name}")
     if out is not None:

@@ -93,7 +93,7 @@ def explain(
         env_arguments=env_arguments or (),
     )
     if out is None and not parts and not as_json:
-        from trdlab.runs import free_name
+        from trdlab.files import free_name
 
         out = free_name(Path("explanations"), found.name)
     if out is not None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,9 @@ from trdlab.explanations.moment.moment import Choice
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.printable import Printable
 from trdlab.tabular import ExactTable, Ties, exact
-from trdlab.tabular.named import TabularWorld
+
+if TYPE_CHECKING:
+    from trdlab.tabular.named import TabularWorld
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,7 +28,7 @@ class SolvedState(Printable):
         choice: an action and the one it is held against.
     """
 
-    world: Gridworld | TabularWorld
+    world: "Gridworld | TabularWorld"
     table: ExactTable
     state: int
     choice: Choice

@@ -11,7 +11,7 @@ from trdlab.runs.checkpoint import (
     save_checkpoint,
 )
 from trdlab.runs.config import read_config, to_toml
-from trdlab.runs.folder import RunFolder, free_name
+from trdlab.runs.folder import RunFolder
 from trdlab.runs.listing import RunSummary, list_runs
 from trdlab.runs.metrics import MetricsFile, read_metrics
 
@@ -21,7 +21,6 @@ __all__ = [
     "RunFolder",
     "RunSummary",
     "checkpoint_steps",
-    "free_name",
     "list_runs",
     "load_checkpoint",
     "read_arrays",

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
-from itertools import count
 from pathlib import Path
 from typing import Any, Self
 
@@ -179,12 +178,6 @@ def check_free(path: Path) -> None:
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         kind = "is not empty" if path.is_dir() else "is a file"
         raise OutputError(f"'{path}' {kind}.", "Choose another `out`.")
-
-
-def free_name(parent: Path, stem: str) -> Path:
-    """Returns the first of `stem`, `stem-2`, `stem-3`, … that is not there yet."""
-    names = (parent / (stem if at == 1 else f"{stem}-{at}") for at in count(1))
-    return next(path for path in names if not path.exists() and not path.is_symlink())
 
 
 def is_run(path: Path) -> bool:

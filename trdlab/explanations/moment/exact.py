@@ -1,6 +1,7 @@
 """Moments of exactly solved models, where everything that can be known is known."""
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,9 +9,11 @@ from trdlab.arrays import RELATIVE_ZERO, BoolArray, FloatArray, IntArray
 from trdlab.explanations.moment.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
-from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.reach import reached
 from trdlab.tabular.uncertainty import outcomes, spread
+
+if TYPE_CHECKING:
+    from trdlab.tabular.named import TabularWorld
 
 _ROUNDING = 1e-9  # of a total: sums of many steps that differ by less are the same
 GAMMA_RANGE = (0.01, 0.99)
@@ -116,7 +119,7 @@ def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
     return tabular_moment(table, state, world.action_names, what_ifs)
 
 
-def exact_moment(world: Gridworld | TabularWorld, table: ExactTable, state: int) -> Moment:
+def exact_moment(world: "Gridworld | TabularWorld", table: ExactTable, state: int) -> Moment:
     """Returns what the table of a model expects in one state, with what can be varied there."""
     if isinstance(world, Gridworld):
         return gridworld_moment(world, table, state)

@@ -1,8 +1,7 @@
 """Scenes: what stands around the numbers of a solved world, and which state it is."""
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from trdlab.formatting import plain
 from trdlab.gridworld import Gridworld
@@ -15,8 +14,7 @@ _LIMIT = "The environment cuts episodes off after {} steps; the model does not."
 _NEVER = "Episodes are over in this state, or never come to it."
 
 
-@dataclass(frozen=True)
-class Scene:
+class Scene(NamedTuple):
     """What stands around the numbers: which world and state this is.
 
     Args:

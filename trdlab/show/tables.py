@@ -1,7 +1,7 @@
 """Tables of a page: what each action is worth, as the cells that text and HTML lay out."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from trdlab.arrays import FloatArray, same
 from trdlab.explanations.moment.moment import Choice, Moment
@@ -10,8 +10,7 @@ from trdlab.formatting import amount, decimals_for, decimals_to_tell, number
 Row = tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """Rows of cells; the first cell says what a row is about.
 
     Args:
@@ -26,7 +25,7 @@ class Table:
     heading: Row
     rows: tuple[Row, ...]
     sides: str
-    styles: Mapping[str, str] = field(default_factory=dict)
+    styles: Mapping[str, str] = {}
     components: int = 0
 
 

@@ -1,7 +1,7 @@
 """Exact values: the optimal ones and those of a given policy, each with a proven error bound."""
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -122,8 +122,7 @@ def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, Float
 # ---- policy iteration ----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class _Candidate:
+class _Candidate(NamedTuple):
     """Actions `[S]`, their chain, and about what they are worth `[S]`."""
 
     actions: IntArray
@@ -233,8 +232,7 @@ def _chosen_without_loss(
 # ---- values with a proven bound ------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class _Evaluation:
+class _Evaluation(NamedTuple):
     """A solution, and what it was made of: values `[S]`, their residual and their bound `[S]`."""
 
     solution: Solution

@@ -41,8 +41,10 @@ class Samples:
 
 def per_episode(values: FloatArray, episode: IntArray, num_episodes: int) -> FloatArray:
     """Returns `[E, ...]`: the sums of `values [M, ...]` by `episode [M]`, which is in order."""
-    bounds = np.searchsorted(episode, np.arange(1, num_episodes))
-    return np.stack([part.sum(axis=0) for part in np.split(values, bounds)])
+    sums = np.zeros((num_episodes, *values.shape[1:]))
+    there, starts = np.unique(episode, return_index=True)
+    sums[there] = np.add.reduceat(values, starts, axis=0)
+    return sums
 
 
 def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:

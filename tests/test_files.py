@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 from trdlab.errors import OutputError, TrdlabError
-from trdlab.files import check_output, is_leftover, read_json, write_json, write_whole
+from trdlab.files import (
+    check_output,
+    free_name,
+    is_leftover,
+    read_json,
+    write_json,
+    write_whole,
+)
 
 SUFFIXES = (".png", ".svg")
 
@@ -60,6 +67,13 @@ def test_a_folder_that_says_it_is_not_writable(tmp_path, monkeypatch):
         refused(tmp_path / "a.png")
         == f"The folder '{tmp_path}' is not writable. Choose another one."
     )
+
+
+def test_a_free_name(tmp_path):
+    for name in ("breakout", "breakout-2", "breakout-3"):
+        assert free_name(tmp_path, "breakout") == tmp_path / name
+        (tmp_path / name).mkdir()
+    assert free_name(tmp_path / "new", "pong") == tmp_path / "new" / "pong"
 
 
 # ---- writing -----------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ import json
 import os
 from collections.abc import Callable, Collection
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
@@ -58,6 +59,30 @@ def check_small_text(path: Path) -> None:
         raise InputError(f"'{path}' is a device.", "Name a text file.")
     if path.is_file() and (size := path.stat().st_size) > 1_000_000:
         raise InputError(f"'{path}' has {size:,} bytes.", "Name a text file, below a megabyte.")
+
+
+def free_name(parent: Path, stem: str) -> Path:
+    """Returns the first of `stem`, `stem-2`, `stem-3`, … that is not there yet."""
+    names = (parent / (stem if at == 1 else f"{stem}-{at}") for at in count(1))
+    return next(path for path in names if not path.exists() and not path.is_symlink())
+
+
+def new_folder(parent: Path, stem: str) -> Path:
+    """Makes a folder of the first free name, which is then this process's own.
+
+    Raises:
+        OutputError: it cannot be made.
+    """
+    while True:
+        path = free_name(parent, stem)
+        try:
+            path.mkdir(parents=True)
+        except OSError as error:
+            if not path.exists():  # else another process was quicker
+                cause = f"Cannot make the folder '{path}': {error.strerror or error}."
+                raise OutputError(cause, "Choose another folder.") from error
+        else:
+            return path
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:

@@ -14,6 +14,7 @@ LEVEL = 0.95
 RESAMPLES = 1_000
 FEWEST_EPISODES = 10
 """Different episodes below which no interval is given."""
+_AT_ONCE = 100  # resamples of a bootstrap, which then stay in the cache
 
 Flags = BoolArray | np.bool_
 # np.random takes long to import, so it is named in strings only
@@ -125,8 +126,10 @@ def bootstrap(
             f"There is no interval for samples of shape {values.shape}.",
             "Give at least one number, all of them finite.",
         )
-    drawn = values[rng.integers(values.size, size=(resamples, values.size))]  # [resamples, n]
-    low, high = np.quantile(statistic(drawn), [(1 - level) / 2, (1 + level) / 2])
+    counts = [min(_AT_ONCE, resamples - begun) for begun in range(0, resamples, _AT_ONCE)]
+    sizes = ((count, values.size) for count in counts)
+    found = [statistic(values[rng.integers(values.size, size=size)]) for size in sizes]
+    low, high = np.quantile(np.concatenate(found), [(1 - level) / 2, (1 + level) / 2])
     return Estimate(float(statistic(values)), float(low), float(high))
 
 

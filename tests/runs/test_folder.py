@@ -15,7 +15,6 @@ from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.runs import (
     MetricsFile,
     RunFolder,
-    free_name,
     list_runs,
     new_folder,
     read_config,
@@ -88,13 +87,6 @@ def test_a_failure_leaves_nothing_that_blocks_a_retry(tmp_path, monkeypatch):
         RunFolder.create(path, {"seed": None})
     assert not list(tmp_path.iterdir())
     RunFolder.create(path, CONFIG)
-
-
-def test_a_free_name(tmp_path):
-    for name in ("breakout", "breakout-2", "breakout-3"):
-        assert free_name(tmp_path, "breakout") == tmp_path / name
-        (tmp_path / name).mkdir()
-    assert free_name(tmp_path / "new", "pong") == tmp_path / "new" / "pong"
 
 
 # ---- opening -----------------------------------------------------------------------------------

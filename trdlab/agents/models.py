@@ -11,7 +11,6 @@ from trdlab.environments.naming import numbered
 from trdlab.errors import InputError, closest
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.env import GridworldEnv
-from trdlab.runs.folder import is_run
 from trdlab.tabular import MDP
 from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.named import TabularWorld
@@ -67,7 +66,7 @@ def is_model(name: str) -> bool:
         return True
     path = Path(name.partition(",")[0])
     try:
-        return path.is_file() and not is_run(path)
+        return path.is_file()
     except OSError as error:
         short = name if len(name) <= _LONG else f"{name[:_LONG]}…"
         raise InputError(

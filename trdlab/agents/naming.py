@@ -11,8 +11,6 @@ from trdlab.agents.models import GRIDWORLD, TABULAR, is_model
 from trdlab.agents.places import AXIS, Where, changed
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
-from trdlab.runs.checkpoint import checkpoint_steps
-from trdlab.runs.folder import RunFolder
 from trdlab.tabular.toytext import toy_text_ids
 
 _OWN_AXIS = "is a run with its own γ, N and w."
@@ -77,6 +75,8 @@ def _checkpoint(name: str) -> tuple[Path, int | None]:
         return Path(name), None
     if step.isdecimal() and len(step) < 19:  # more digits are no number of steps
         return Path(folder), int(step)
+    from trdlab.runs import RunFolder, checkpoint_steps
+
     steps = checkpoint_steps(RunFolder.open(Path(folder)))
     raise InputError(
         f"'{step}' is no step of a checkpoint of '{folder}'.",

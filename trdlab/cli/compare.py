@@ -74,7 +74,7 @@ def compare(
     named = Path("explanations"), f"{agents[0].name}-against-{agents[1].name}"
     is_named = out is None and not as_json
     if is_named:
-        from trdlab.runs import free_name, new_folder
+        from trdlab.files import free_name, new_folder
 
         out = free_name(*named)
     if out is not None:

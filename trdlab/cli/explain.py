@@ -95,7 +95,7 @@ def explain(
     named = Path("explanations"), found.name
     is_named = out is None and not parts and not as_json
     if is_named:
-        from trdlab.runs import free_name, new_folder
+        from trdlab.files import free_name, new_folder
 
         out = free_name(*named)
     if out is not None:

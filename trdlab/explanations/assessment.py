@@ -64,7 +64,7 @@ def assess(
         raise InputError(f"There are {episodes} episodes.", "Ask for at least 1.")
     judging, chance = _Judging(agent, episodes, max_steps, seed, watch), epsilon or 0.0
     played, alike = (judging.played(chance), False) if chance else judging.alike()
-    score = score_of(played, seed=seed)
+    score = score_of(played, seed=seed) if alike else None
     if alike:
         played = distinct(played)
     if alike and epsilon is None:

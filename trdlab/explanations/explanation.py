@@ -179,18 +179,9 @@ def explain(
         missing += [report.lost] * bool(report.lost)
     if choice is not None and report is not None:
         choice = replace(choice, moment=judged(choice.moment, report))
+    trial = None if tried is None else trial_of(agent, tried, report, seed=seed)
     return Explanation(
-        agent=agent,
-        parts=parts,
-        seed=seed,
-        step=step,
-        choice=choice,
-        report=report,
-        trial=None if tried is None else trial_of(agent, tried, report, seed=seed),
-        story=story,
-        max_steps=limit,
-        missing=tuple(missing),
-        state=state,
+        agent, parts, seed, step, choice, report, trial, story, limit, tuple(missing), state
     )
 
 

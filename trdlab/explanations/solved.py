@@ -1,6 +1,7 @@
 """One state of a solved world: its exact table, and the choice that is explained there."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +11,9 @@ from trdlab.explanations.moment.moment import Choice
 from trdlab.gridworld import Gridworld
 from trdlab.printable import Printable
 from trdlab.tabular import ExactTable, Ties, exact
-from trdlab.tabular.named import TabularWorld
+
+if TYPE_CHECKING:
+    from trdlab.tabular.named import TabularWorld
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,7 +27,7 @@ class SolvedState(Printable):
         choice: an action and the one it is held against.
     """
 
-    world: Gridworld | TabularWorld
+    world: "Gridworld | TabularWorld"
     table: ExactTable
     state: int
     choice: Choice

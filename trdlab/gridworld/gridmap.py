@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from trdlab.errors import MapError, closest
 
@@ -19,8 +19,7 @@ _FOLDER = Path(__file__).parent / "maps"
 _DEFAULT_VALUES = {"coin": 1.0, "treasure": 4.0, "hazard": -1.0, "fountain": 1.0, "exit": 0.0}
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """What a symbol on the map means.
 
     Coins and treasures pay once, hazards and fountains each time they are entered. A terminal
@@ -55,8 +54,7 @@ LEGEND: dict[str, Cell] = {
 }
 
 
-@dataclass(frozen=True)
-class Wind:
+class Wind(NamedTuple):
     """Pushes the drone after each of its moves, by the strength at the column (or row) it left.
 
     Args:
@@ -133,7 +131,7 @@ class GridMap:
             )
         value = _finite(kind, value)
         legend = {
-            symbol: replace(cell, value=value) if cell.kind == kind else cell
+            symbol: cell._replace(value=value) if cell.kind == kind else cell
             for symbol, cell in self.legend.items()
         }
         return replace(self, legend=legend)

@@ -1,8 +1,8 @@
 """A gridworld's exact dynamics: its reachable states and their transitions."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ _OPPOSITE = (1, 0, 3, 2)
 Place = tuple[int, int]
 
 
-@dataclass(frozen=True)
-class State:
+class State(NamedTuple):
     """Where the drone is, and which one-time cells it has emptied."""
 
     row: int
@@ -37,16 +36,14 @@ class State:
         return f"row {self.row}, column {self.column}{taken}"
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """Where reward comes from: the cells of one kind and value, or the cost of each step."""
 
     kind: str
     value: float
 
 
-@dataclass(frozen=True)
-class _Outcome:
+class _Outcome(NamedTuple):
     """One result of an action: the next state, what it earned from each source, and the end."""
 
     next_state: int

@@ -166,7 +166,7 @@ class Recording:
 
     def _episode(self, env: int, coins: BoolArray, time_limit: int | None) -> Episode:
         """Returns the episode of an environment, of its log and of coins for past its end."""
-        columns = [np.stack(column) for column in zip(*self._logs[env], strict=True)]
+        columns = [np.array(column) for column in zip(*self._logs[env], strict=True)]
         components, expected, actions, rewards, life_lost, ends, terminated, random = columns
         return Episode(
             decomposition=RewardDecomposition(components, self._estimator.time_axis),

@@ -36,8 +36,10 @@ class Samples:
 
     def per_episode(self, values: FloatArray, every: int = 1) -> FloatArray:
         """Returns `[E, ...]`: the sums by episode of `values [M/every, ...]`, of one in `every`."""
-        bounds = np.searchsorted(self.episode[::every], np.arange(1, self.num_episodes))
-        return np.stack([part.sum(axis=0) for part in np.split(values, bounds)])
+        sums = np.zeros((self.num_episodes, *values.shape[1:]))
+        there, starts = np.unique(self.episode[::every], return_index=True)
+        sums[there] = np.add.reduceat(values, starts, axis=0)
+        return sums
 
 
 def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:

@@ -11,7 +11,7 @@ from trdlab.runs.checkpoint import (
     save_checkpoint,
 )
 from trdlab.runs.config import read_config, to_toml
-from trdlab.runs.folder import RunFolder, free_name, new_folder
+from trdlab.runs.folder import RunFolder
 from trdlab.runs.listing import RunSummary, list_runs
 from trdlab.runs.metrics import MetricsFile, read_metrics
 
@@ -21,10 +21,8 @@ __all__ = [
     "RunFolder",
     "RunSummary",
     "checkpoint_steps",
-    "free_name",
     "list_runs",
     "load_checkpoint",
-    "new_folder",
     "read_arrays",
     "read_config",
     "read_metrics",

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
-from itertools import count
 from pathlib import Path
 from typing import Any, Self
 
@@ -179,30 +178,6 @@ def check_free(path: Path) -> None:
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         kind = "is not empty" if path.is_dir() else "is a file"
         raise OutputError(f"'{path}' {kind}.", "Choose another `out`.")
-
-
-def free_name(parent: Path, stem: str) -> Path:
-    """Returns the first of `stem`, `stem-2`, `stem-3`, … that is not there yet."""
-    names = (parent / (stem if at == 1 else f"{stem}-{at}") for at in count(1))
-    return next(path for path in names if not path.exists() and not path.is_symlink())
-
-
-def new_folder(parent: Path, stem: str) -> Path:
-    """Makes a folder of the first free name, which is then this process's own.
-
-    Raises:
-        OutputError: it cannot be made.
-    """
-    while True:
-        path = free_name(parent, stem)
-        try:
-            path.mkdir(parents=True)
-        except OSError as error:
-            if not path.exists():  # else another process was quicker
-                cause = f"Cannot make the folder '{path}': {error.strerror or error}."
-                raise OutputError(cause, "Choose another folder.") from error
-        else:
-            return path
 
 
 def is_run(path: Path) -> bool:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from trdlab.errors import OutputError, TrdlabError
-from trdlab.files import is_leftover, remove, write_whole
-from trdlab.runs.folder import RunFolder, free_name
+from trdlab.files import free_name, is_leftover, remove, write_whole
+from trdlab.runs.folder import RunFolder
 from trdlab.runs.index import INDEX, Index, Sum
 
 FOLDER = re.compile(r"(\d{9,})(?:\.(\d+))?")  # a step, and which attempt where there were several

@@ -1,10 +1,9 @@
 """Documents: what a page holds, whatever it is rendered to; one maker for each noun."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import singledispatch
 from importlib import import_module
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from trdlab.explanations.moment.telling import in_brief, sections
 from trdlab.explanations.sections import Section
@@ -19,8 +18,7 @@ T = TypeVar("T")
 _MOST_ERROR = 1e-6  # of the largest reward, beyond which it is not called exact
 
 
-@dataclass(frozen=True)
-class Document:
+class Document(NamedTuple):
     """What a page holds, in the order it is shown.
 
     Args:

@@ -1,21 +1,20 @@
 """Scenes: what stands around the numbers of a solved world, and which state it is."""
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from trdlab.environments.arguments import say_arguments
 from trdlab.formatting import plain
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.ansi import ansi, legend
-from trdlab.tabular.named import TabularWorld
+
+if TYPE_CHECKING:
+    from trdlab.tabular.named import TabularWorld
 
 _LIMIT = "The environment cuts episodes off after {} steps; the model does not."
 _NEVER = "Episodes are over in this state, or never come to it."
 
 
-@dataclass(frozen=True)
-class Scene:
+class Scene(NamedTuple):
     """What stands around the numbers: which world and state this is.
 
     Args:
@@ -41,7 +40,7 @@ class Scene:
     notes: tuple[str, ...] = ()
 
 
-def scene_of(world: Gridworld | TabularWorld, state: int) -> Scene:
+def scene_of(world: "Gridworld | TabularWorld", state: int) -> Scene:
     """Returns the scene of a state of a solved world."""
     return _on_map(world, state) if isinstance(world, Gridworld) else _in_table(world, state)
 
@@ -64,7 +63,9 @@ def _on_map(world: Gridworld, state: int) -> Scene:
     )
 
 
-def _in_table(world: TabularWorld, state: int) -> Scene:
+def _in_table(world: "TabularWorld", state: int) -> Scene:
+    from trdlab.environments.arguments import say_arguments  # gridworlds do without it
+
     mdp, here = world.mdp, world.describe(state)
     told = {k: v for k, v in world.arguments.items() if isinstance(v, bool | str)}
     notes = [_NEVER] * (not world.visited[state] and not mdp.terminal_states[state])

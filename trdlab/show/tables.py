@@ -1,17 +1,16 @@
 """Tables of a page: what each action is worth, as the cells that text and HTML lay out."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from trdlab.arrays import FloatArray, difference
+from trdlab.arrays import FloatArray, same
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.formatting import amount, decimals_for, decimals_to_tell, number
 
 Row = tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """Rows of cells; the first cell says what a row is about.
 
     Args:
@@ -26,7 +25,7 @@ class Table:
     heading: Row
     rows: tuple[Row, ...]
     sides: str
-    styles: Mapping[str, str] = field(default_factory=dict)
+    styles: Mapping[str, str] = {}
     components: int = 0
 
 
@@ -55,9 +54,7 @@ def action_table(choice: Choice) -> Table | None:
     styles = {name: "dim" for name in moment.action_names if name not in (action, foil)}
     if foil is not None:
         gap = moment.difference(action, foil)
-        q_gap, total = (
-            float(difference(of(action), of(foil))) for of in (moment.q_value, moment.total)
-        )
+        q_gap, total = (_gap(of(action), of(foil)) for of in (moment.q_value, moment.total))
         decimals = max(decimals, decimals_for(gap), decimals_for([q_gap]))
         of_totals = max(of_totals, decimals_for([total]))
         name = f"{action} − {foil}"
@@ -66,6 +63,10 @@ def action_table(choice: Choice) -> Table | None:
     heading = ("action", *axis.labels, "Q", *["total"] * has_totals, "")
     sides = "<" + ">" * len(heading[2:]) + "<"
     return Table(heading, tuple(rows), sides, styles, axis.num_components)
+
+
+def _gap(a: float, b: float) -> float:
+    return 0.0 if same(a, b) else a - b
 
 
 def _note(moment: Moment, i: int) -> str:

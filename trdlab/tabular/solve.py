@@ -1,7 +1,7 @@
 """Exact values: the optimal ones and those of a given policy, each with a proven error bound."""
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -102,7 +102,9 @@ def evaluate(mdp: MDP, policy: FloatArray, gamma: float) -> Solution:
     return _evaluated(mdp, gamma, policy, chain_of(mdp, policy, gamma)).solution
 
 
-def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, FloatArray]:
+def improved(
+    mdp: MDP, gamma: float, actions: IntArray, chain: Chain | None = None
+) -> tuple[IntArray, FloatArray, Chain]:
     """Policy iteration from given actions, as far as gains stand out from rounding.
 
     It is the quick way to follow an optimum while the model changes a little; it proves nothing.
@@ -111,19 +113,20 @@ def improved(mdp: MDP, gamma: float, actions: IntArray) -> tuple[IntArray, Float
         mdp: the model.
         gamma: the discount factor, in [0, 1).
         actions: `[S]`, a deterministic policy to start from.
+        chain: its chain, where that is known: it does not depend on rewards.
 
     Returns:
-        Optimal actions `[S]` and their Q-values `[S, A]`.
+        Optimal actions `[S]`, their Q-values `[S, A]`, and their chain.
     """
-    found = _improved(mdp, gamma, actions, np.zeros(mdp.num_states))
-    return found.actions, mdp.expected_rewards + gamma * mdp.expect(found.values)
+    found = _improved(mdp, gamma, actions, np.zeros(mdp.num_states), chain)
+    q_values = mdp.expected_rewards + gamma * mdp.expect(found.values)
+    return found.actions, q_values, found.chain
 
 
 # ---- policy iteration ----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class _Candidate:
+class _Candidate(NamedTuple):
     """Actions `[S]`, their chain, and about what they are worth `[S]`."""
 
     actions: IntArray
@@ -155,7 +158,9 @@ def _greedy_after_sweeps(mdp: MDP, gamma: float) -> tuple[IntArray, FloatArray]:
     return actions, values
 
 
-def _improved(mdp: MDP, gamma: float, actions: IntArray, values: FloatArray) -> _Candidate:
+def _improved(
+    mdp: MDP, gamma: float, actions: IntArray, values: FloatArray, chain: Chain | None = None
+) -> _Candidate:
     """Policy iteration with sweeps of value iteration between the evaluations.
 
     A change of action spreads by one step in each improvement. So sweeps go on until the actions
@@ -163,9 +168,9 @@ def _improved(mdp: MDP, gamma: float, actions: IntArray, values: FloatArray) -> 
     comes to an end.
     """
     states, sweeps, margin = np.arange(mdp.num_states), sweep_count(mdp), _GAIN
+    chain = _deterministic(mdp, gamma, actions) if chain is None else chain
     for turn in range(_MAX_ROUNDS):
-        chain, rewards = _deterministic(mdp, gamma, actions), mdp.expected_rewards[states, actions]
-        values = chain.solve(rewards, values)
+        values = chain.solve(mdp.expected_rewards[states, actions], values)
         better = _better(mdp, gamma, values, actions, margin)
         if np.array_equal(better, actions) or turn == _MAX_ROUNDS - 1:
             break
@@ -174,7 +179,7 @@ def _improved(mdp: MDP, gamma: float, actions: IntArray, values: FloatArray) -> 
             before, better = better, _better(mdp, gamma, values, better, margin)
             if np.array_equal(better, before):
                 break
-        actions, margin = better, 1.2 * margin
+        actions, margin, chain = better, 1.2 * margin, _deterministic(mdp, gamma, better)
     return _Candidate(actions, chain, values)
 
 
@@ -233,8 +238,7 @@ def _chosen_without_loss(
 # ---- values with a proven bound ------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class _Evaluation:
+class _Evaluation(NamedTuple):
     """A solution, and what it was made of: values `[S]`, their residual and their bound `[S]`."""
 
     solution: Solution

@@ -5,7 +5,7 @@ E[R | s, a, s′] is not in a model.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from trdlab.tabular.table import ExactTable
 _ROUNDING = 1e-24  # of a square: what is below comes from rounding
 
 
-@dataclass(frozen=True, eq=False)
-class Spread:
+class Spread(NamedTuple):
     """The spread of each component of a table, and the survival of its episodes.
 
     Args:

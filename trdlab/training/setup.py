@@ -16,8 +16,8 @@ from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.files import check_small_text
-from trdlab.runs import free_name, read_config
+from trdlab.files import check_small_text, free_name
+from trdlab.runs import read_config
 from trdlab.training.machine import check_threads, memory_of, resolved, use_threads
 
 if TYPE_CHECKING:

@@ -1,6 +1,7 @@
 """Moments of exactly solved models, where everything that can be known is known."""
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,9 +9,12 @@ from trdlab.arrays import RELATIVE_ZERO, BoolArray, FloatArray, IntArray
 from trdlab.explanations.moment.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
-from trdlab.tabular.named import TabularWorld
+from trdlab.tabular.chains import Chain
 from trdlab.tabular.reach import reached
 from trdlab.tabular.uncertainty import outcomes, spread
+
+if TYPE_CHECKING:
+    from trdlab.tabular.named import TabularWorld
 
 _ROUNDING = 1e-9  # of a total: sums of many steps that differ by less are the same
 GAMMA_RANGE = (0.01, 0.99)
@@ -116,7 +120,7 @@ def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
     return tabular_moment(table, state, world.action_names, what_ifs)
 
 
-def exact_moment(world: Gridworld | TabularWorld, table: ExactTable, state: int) -> Moment:
+def exact_moment(world: "Gridworld | TabularWorld", table: ExactTable, state: int) -> Moment:
     """Returns what the table of a model expects in one state, with what can be varied there."""
     if isinstance(world, Gridworld):
         return gridworld_moment(world, table, state)
@@ -157,16 +161,17 @@ def source_name(world: Gridworld, source: Source) -> str:
 
 
 class _Resolved:
-    """Q-values of one state as one quantity varies, each solve starting from the last actions."""
+    """Q-values of one state as one quantity varies, each solve starting from the last one."""
 
     def __init__(self, state: int, model: Callable[[float], tuple[MDP, float]]) -> None:
         self.state, self.model = state, model
-        self.actions: IntArray | None = None
+        self.last: tuple[float, IntArray, Chain | None] | None = None
 
     def __call__(self, value: float) -> FloatArray:
         mdp, gamma = self.model(value)
-        actions = optimal(mdp, gamma).policy.argmax(1) if self.actions is None else self.actions
-        self.actions, q_values = improved(mdp, gamma, actions)
+        before, actions, chain = self.last or (gamma, optimal(mdp, gamma).policy.argmax(1), None)
+        actions, q_values, chain = improved(mdp, gamma, actions, chain if gamma == before else None)
+        self.last = gamma, actions, chain
         return np.asarray(q_values[self.state])
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from trdlab.explanations.calibration.calibration import Status, Trust
 
 
-@dataclass(frozen=True, eq=False)
-class WhatIf:
+class WhatIf(NamedTuple):
     """One quantity of the world that can be varied: γ, or what a source of reward pays.
 
     Args:
@@ -47,8 +46,7 @@ class WhatIf:
         return of_gamma if self.name == "γ" else of_reward if self.current > 0.0 else of_cost
 
 
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
+class Uncertainty(NamedTuple):
     """What is known of a moment beyond its means.
 
     Args:

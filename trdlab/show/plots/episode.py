@@ -153,7 +153,7 @@ def _plot_rewards(ax: Axes, told: Story) -> None:
     ax.set(xlim=(-0.5, len(rewards) - 0.5), ylabel="reward", xlabel="step of the episode")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
     ax.yaxis.set_major_locator(MaxNLocator(nbins=3))
-    how: Any = {"fontsize": style.TEXT, "color": style.MUTED, "pad": 2.0}
+    how: Any = {"fontsize": style.TEXT, "color": style.MUTED, "pad": 3.5}
     style.tidy(ax).set_title("ended" if is_over else "cut off", loc="right", **how)
 
 

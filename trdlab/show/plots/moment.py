@@ -160,7 +160,7 @@ def without_noise(moment: Moment, error: float) -> Moment:
     found = RewardDecomposition(settled(found.components, error), found.time_axis)
     if known is not None:
         spread = np.where(known.deviation**2 <= error, 0.0, known.deviation)
-        known = replace(known, deviation=spread)
+        known = known._replace(deviation=spread)
     return replace(moment, decomposition=found, uncertainty=known)
 
 

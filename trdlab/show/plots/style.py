@@ -48,13 +48,14 @@ LETTERS = 72  # of `TEXT` that fit beside each other
 STEPS = "steps from now (t: the action taken now)"
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 
-_DPI = 200
+_DPI = 160
 _GAP = 0.6  # between the explicit components and the residual, in bars
 _MOST_LETTERS = 40  # beneath one axis
 _SETTINGS: Any = {
     "font.size": TEXT,
     "text.color": INK,
     "axes.edgecolor": MUTED,
+    "axes.titley": 1.0,  # there are no ticks above axes that a title would have to clear
     "hatch.linewidth": 0.8,
     "svg.hashsalt": "trdlab",  # the same bytes each time
 }
@@ -139,7 +140,8 @@ def save(figure: Figure, path: Path) -> None:
     except OSError as error:
         cause = f"Cannot make the folder '{path.parent}': {error.strerror or error}."
         raise OutputError(cause, "Choose another folder.") from error
-    write_whole(path, figure.savefig)
+    how: Any = {"pil_kwargs": {"compress_level": 1}} if path.suffix.lower() == ".png" else {}
+    write_whole(path, lambda at: figure.savefig(at, **how))
 
 
 def action_colours(names: Sequence[str]) -> dict[str, str]:

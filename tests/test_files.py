@@ -11,6 +11,7 @@ from trdlab.files import (
     check_output,
     free_name,
     is_leftover,
+    new_folder,
     read_json,
     write_json,
     write_whole,
@@ -74,6 +75,17 @@ def test_a_free_name(tmp_path):
         assert free_name(tmp_path, "breakout") == tmp_path / name
         (tmp_path / name).mkdir()
     assert free_name(tmp_path / "new", "pong") == tmp_path / "new" / "pong"
+
+
+def test_a_new_folder_is_made_for_one_alone(tmp_path):
+    assert new_folder(tmp_path / "new", "pong") == tmp_path / "new" / "pong"
+    assert new_folder(tmp_path / "new", "pong") == tmp_path / "new" / "pong-2"
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match=r"Cannot make the folder .*pong'"):
+        new_folder(tmp_path / "file", "pong")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    with pytest.raises(OutputError, match="Cannot make the folder"):
+        new_folder(tmp_path / "nowhere", "pong")
 
 
 # ---- writing -----------------------------------------------------------------------------------

@@ -16,7 +16,6 @@ from trdlab.runs import (
     MetricsFile,
     RunFolder,
     list_runs,
-    new_folder,
     read_config,
     save_checkpoint,
     to_toml,
@@ -95,17 +94,6 @@ def test_a_failure_leaves_nothing_that_blocks_a_retry(tmp_path, monkeypatch):
 @pytest.fixture
 def run(tmp_path) -> RunFolder:
     return RunFolder.create(tmp_path / "breakout", CONFIG)
-
-
-def test_a_new_folder_is_made_for_one_alone(tmp_path):
-    assert new_folder(tmp_path / "new", "pong") == tmp_path / "new" / "pong"
-    assert new_folder(tmp_path / "new", "pong") == tmp_path / "new" / "pong-2"
-    (tmp_path / "file").touch()
-    with pytest.raises(OutputError, match=r"Cannot make the folder .*pong'"):
-        new_folder(tmp_path / "file", "pong")
-    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
-    with pytest.raises(OutputError, match="Cannot make the folder"):
-        new_folder(tmp_path / "nowhere", "pong")
 
 
 def test_a_misspelt_run_gets_a_suggestion(run):

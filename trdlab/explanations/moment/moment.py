@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from trdlab.arrays import RELATIVE_ZERO, BoolArray, FloatArray, same
+from trdlab.arrays import FloatArray, difference, same
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, closest
 from trdlab.estimator import Estimator, Future
@@ -179,13 +179,11 @@ class Moment:
 
     def difference(self, action: str, foil: str) -> FloatArray:
         """Returns `[N+1]`: action minus foil, exactly 0 where they differ only by rounding."""
-        a, b = self.components(action), self.components(foil)
-        return np.where(_equal(a, b), 0.0, a - b)
+        return difference(self.components(action), self.components(foil))
 
     def lead(self, action: str, foil: str) -> FloatArray:
         """Returns `[N+1]`: how far the action is ahead, rewards summed up to each component."""
-        a, b = self.components(action).cumsum(), self.components(foil).cumsum()
-        return np.where(_equal(a, b), 0.0, self.difference(action, foil).cumsum())
+        return difference(self.components(action).cumsum(), self.components(foil).cumsum())
 
     def choice(self, action: str | None = None, foil: str | None = None) -> "Choice":
         """Returns an action to explain and another to hold it against, filling in what is not said.
@@ -269,8 +267,3 @@ def moment_of(estimator: Estimator, observation: Any, action_names: Sequence[str
     exactly = told.astype(np.float64)  # findings compare sums, and float32 sums differ in order
     decomposition = RewardDecomposition(exactly, estimator.time_axis)
     return Moment(decomposition, tuple(action_names), estimator.future)
-
-
-def _equal(a: FloatArray, b: FloatArray) -> BoolArray:
-    """Returns where two rows of numbers are the same up to rounding."""
-    return np.asarray(np.abs(a - b) <= RELATIVE_ZERO * np.maximum(np.abs(a), np.abs(b)))

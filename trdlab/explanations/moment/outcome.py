@@ -48,12 +48,8 @@ class Trial:
     def to_dict(self) -> dict[str, Any]:
         """Returns the numbers and the claims as plain data at full precision."""
         told = [claim.to_dict() for claim in _told(self)]
-        return {
-            **plain_data(self.found),
-            "action": self.action,
-            "foil": self.foil,
-            "findings": told,
-        }
+        about = {"action": self.action, "foil": self.foil, "findings": told}
+        return dict(plain_data(self.found)) | about
 
 
 def _forms(trial: Trial) -> dict[str, Form]:

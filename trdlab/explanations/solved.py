@@ -44,7 +44,7 @@ class SolvedState(Printable):
 
 
 def solve_state(
-    world: Gridworld | TabularWorld,
+    world: "Gridworld | TabularWorld",
     time_axis: TimeAxis,
     *,
     state: str | None = None,

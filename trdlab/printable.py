@@ -28,4 +28,4 @@ class Printable:
 
     def plot(self) -> Any:
         """Returns the picture: a matplotlib `Figure`, which notebooks show."""
-        return import_module("trdlab.show.plots").figure(self)
+        return import_module("trdlab.show.plots.figures").figure(self)

@@ -65,8 +65,7 @@ def assess(
     judging, chance = _Judging(agent, episodes, max_steps, seed, watch), epsilon or 0.0
     played, alike = (judging.played(chance), False) if chance else judging.alike()
     score = score_of(played, seed=seed) if alike else None
-    if alike:
-        played = distinct(played)
+    played = distinct(played) if alike else played
     if alike and epsilon is None:
         chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
         played = judging.played(chance)

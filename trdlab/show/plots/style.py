@@ -54,6 +54,7 @@ _MOST_LETTERS = 40  # beneath one axis
 _SETTINGS: Any = {
     "font.size": TEXT,
     "text.color": INK,
+    "text.hinting": "none",  # with so many dots letters need none, and take half the time
     "axes.edgecolor": MUTED,
     "axes.titley": 1.0,  # there are no ticks above axes that a title would have to clear
     "hatch.linewidth": 0.8,

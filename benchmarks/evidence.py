@@ -58,8 +58,9 @@ def environments() -> Iterator[Agent]:
 
 def pair(agent: Agent) -> tuple[str, str]:
     """Returns what the table would do, and the best other action, or any."""
-    action, foil = moment_at(agent).pair(None, None)
-    return action, foil or next(name for name in agent.action_names if name != action)
+    choice = moment_at(agent).choice()
+    others = (name for name in agent.action_names if name != choice.action)
+    return choice.action, choice.foil or next(others)
 
 
 def tally(agent: Agent, seeds: int) -> Counter[str]:

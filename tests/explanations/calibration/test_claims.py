@@ -148,11 +148,10 @@ def reports(draw: st.DrawFn) -> CalibrationReport:
         num_ends=20,
         gap=Estimates(nothing, nothing, nothing),
         discount=Estimate(discount, discount - 1e-3, discount + 1e-3),
-        discount_near=discount,
-        discount_far=discount,
-        explained=draw(st.sampled_from([0.99, 0.5])),
+        discount_explains=estimate(st.sampled_from([0.99, 0.5])),
         past_end=estimate(st.sampled_from([0.0, 0.9])),
         past_reset=estimate(st.sampled_from([0.0, 0.9])),
+        end_explains=estimate(st.sampled_from([0.99, 0.5])),
     )
     amount, shift = estimate(st.sampled_from([1.0, 1.5, 0.4])), draw(st.sampled_from([0, 0, 1, -2]))
     share = draw(st.floats(0.0, 1.0))

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from by_hand import Given, episode
 from trdlab.arrays import FloatArray
@@ -127,6 +129,15 @@ def test_a_forgotten_power_of_gamma_is_named(name: str, seed: int):
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("name", WORLDS)
+def test_a_discount_taken_twice_is_named(name: str, seed: int):
+    components = healthy(name, replace(SINGLE, gamma=0.95**2))
+    (fault,) = diagnosed(played(name, components, SINGLE, seed, num=500))
+    assert fault.kind == "discount-off"
+    assert fault.measured == pytest.approx(0.95**2, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", WORLDS)
 def test_an_ignored_end_is_named(name: str, seed: int):
     for axis in (SINGLE, PAIRS):
         (fault,) = diagnosed(played(name, endless(name, axis), axis, seed))
@@ -189,6 +200,40 @@ def test_what_a_young_agent_is_told():
     assert share.sentence == "In the first 8 steps the agent expects 61 % of what comes."
 
 
+def cut(rows: FloatArray, axis: TimeAxis) -> Episode:
+    """An episode that pays 1 a step and is cut off, by what was expected at every observation."""
+    total = len(rows) - 1
+    ends = np.zeros(total, dtype=np.bool_)
+    return episode([1.0] * total, axis, rows, terminated=False, ends=ends)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("horizon", [3, 10, 40])
+def test_a_young_agent_is_told_of_no_discount(horizon: int, seed: int):
+    # its residual has come to half of what is to come, and each component is off by some percent
+    axis, rng = TimeAxis(0.99, horizon), np.random.default_rng(seed)
+    right = axis.discounts * np.append(np.ones(horizon), 0.5 / (1.0 - axis.gamma))
+    off = rng.normal(1.0, 0.03, axis.num_components)
+    lengths = rng.integers(100, 200, 50)
+    noise = [rng.normal(1.0, 0.01, (total + 1, axis.num_components)) for total in lengths]
+    assert diagnosed(tuple(cut(right * off * of, axis) for of in noise)) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_young_agent_that_sees_the_end_is_told_of_none(seed: int):
+    # after ten steps it expects a tenth too much, and in the end a fifth of what it did at first
+    axis, rng, k = TimeAxis(0.99, 10), np.random.default_rng(seed), np.arange(11)
+    episodes = []
+    for total in rng.integers(100, 120, 50):
+        left = total - np.arange(total + 1)[:, None]
+        rows = axis.discounts * (k < left)
+        rows[:, -1:] *= 1.1 * (1.0 - axis.gamma ** (left - 10)) / (1.0 - axis.gamma)
+        rows[-1] = 0.2 * rows[0]
+        rows *= rng.normal(1.0, 0.01, rows.shape)
+        episodes.append(episode([1.0] * total, axis, rows))
+    assert diagnosed(tuple(episodes)) == []
+
+
 # ---- steps that fit each other -------------------------------------------------------------------
 
 
@@ -203,6 +248,39 @@ def test_the_gap_between_steps_by_hand():
     assert (found.num_transitions, found.num_ends) == (2, 1)
     # step 0: 2 − ½·4 and 3 − ½·(1 + 1); step 1 ended, so 1 and 1 should be nothing
     assert found.gap.value.tolist() == [0.5, 1.5]
+
+
+def test_the_discount_by_hand():
+    axis, wrong = TimeAxis(0.5, 3), [[1.0, 0.25, 0.25, 9.0]]
+    found = consistency_of([cut(np.array(wrong * 5), axis)] * 12)
+    # a·1 and a·¼ are to be the gaps ¼ − ½·1 and ¼ − ½·¼, so a = (−¼·1 + ⅛·¼) / (1 + 1/16) = −7/34
+    assert found.discount.value == pytest.approx(1 / 2 - 7 / 34)
+    assert found.discount_explains.value == pytest.approx((7 / 34) ** 2 * (17 / 16) / (5 / 64))
+
+
+@given(
+    factor=st.floats(0.1, 0.95),
+    gamma=st.sampled_from([0.0, 0.3, 0.99]),
+    horizon=st.integers(2, 12),
+    width=st.integers(1, 3),
+)
+def test_a_factor_between_all_components_is_the_discount_and_all_that_is_wrong(
+    factor: float, gamma: float, horizon: int, width: int
+):
+    rows = np.tile(np.append(factor ** np.arange(horizon), 7.0), (9, 1))
+    axis = TimeAxis(gamma, horizon, width)
+    found = consistency_of([cut(rows, axis)] * 12)
+    assert found.discount.value == pytest.approx(factor)
+    if abs(factor - gamma**width) > 1e-6:
+        assert found.discount_explains.value == pytest.approx(1.0)
+
+
+def test_a_residual_that_lags_behind_tells_no_discount():
+    # of 1 a step, 1 is to come after the first two steps: ½·½/(1 − ½); half of that is expected
+    axis = TimeAxis(0.5, 2)
+    found = consistency_of([cut(np.array([[1.0, 0.5, 0.25]] * 5), axis)] * 12)
+    assert found.gap.value.tolist() == [0.0, 0.25 - 0.5 * (0.5 + 0.25)]
+    assert found.discount.value == 0.5
 
 
 def test_pairs_leave_out_what_random_actions_and_truncations_hide():

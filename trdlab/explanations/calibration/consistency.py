@@ -27,17 +27,15 @@ class Consistency:
         num_transitions: how many pairs of steps were compared.
         num_ends: how many of them ended in between.
         gap: `[N]`, the mean of component i ≥ 1 less γ^w times what follows it; 0 if all is well.
-        discount: what the next components are really multiplied by; γ^w if all is well.
-        discount_near: the same of the nearer components alone, those that hold half of what is
-            expected from component 1 on.
-        discount_far: the same of the others; NaN where there are none.
-        explained: the share of the components' size that fits what follows them, whatever the
-            discount; near 1 unless they contradict each other in other ways.
+        discount: what the next explicit components are really multiplied by; γ^w if all is well.
+        discount_explains: the share of the gaps between explicit components that this mends; 1 if
+            nothing else is wrong with them.
         past_end: how much of what is expected after the end of an episode counts although it ended,
             as a share of γ^w; 0 if all is well, 1 where ends are ignored.
         past_reset: the part of that which is expected in the first observation of an episode: what
             comes next where an environment resets itself. The other part is expected in the true
             last one.
+        end_explains: the share of all gaps that this mends.
     """
 
     time_axis: TimeAxis
@@ -45,11 +43,10 @@ class Consistency:
     num_ends: int
     gap: Estimates
     discount: Estimate
-    discount_near: float
-    discount_far: float
-    explained: float
+    discount_explains: Estimate
     past_end: Estimate
     past_reset: Estimate
+    end_explains: Estimate
 
 
 def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency:
@@ -57,10 +54,14 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
 
     With n the components of the action taken at t, n′ those expected at t+w, g = 1 where the
     episode went on and 0 where it ended, and y and z what is expected in the last observation of
-    the episode and in a first one, the means of n_i are fitted, over all i ≥ 1, by
-    d·g·n′_(i−1) + b·(1−g)·y_(i−1) + c·(1−g)·z_(i−1), by least squares. By the law d = γ^w and
-    b = c = 0. Means are compared, because where there is chance a step fits the next on average
-    only; over steps of about the same age, because the age is known before anything happens.
+    the episode and in a first one, the mean gaps n_i − γ^w·g·n′_(i−1), i ≥ 1, are fitted by least
+    squares: by a·g·n′_(i−1), where the discount is γ^w + a, and, apart from that, by
+    b·(1−g)·y_(i−1) + c·(1−g)·z_(i−1). By the law a = b = c = 0. Means are compared, because where
+    there is chance a step fits the next on average only; over steps of about the same age, because
+    the age is known before anything happens.
+
+    The residual tells no discount. It is learned from itself, so it lags behind for 1/(1 − γ^w)
+    copies to the target network, and that looks like another discount.
 
     Raises:
         InputError: there are no episodes, or of different time axes; there are no components to
@@ -80,23 +81,22 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
     scale = max(float(np.abs(of.decomposition.components).max()) for of in episodes)
     sums[:, 1:] *= np.abs(sums[:, 1:]) > RELATIVE_ZERO * scale  # the rest is rounding
     drawn, discount = draws(len(sums), seed), axis.gamma**axis.width  # [1 + R, E]
-    count, before, after = pooled(drawn, sums[:, :3].sum(axis=2)).transpose(1, 0, 2)
-    gap = (before - discount * after) / np.maximum(count, 1.0)  # [1 + R, N]
-    mass = np.abs(before[0]).cumsum()  # [N]
-    near = np.arange(axis.horizon) <= (mass >= mass[-1] / 2.0).argmax()
-    fitted, enough = _fitted(drawn, sums[:, 1:], discount), has_enough(sums)
-    estimates = percentiles(fitted, enough)
+    gaps, enough = sums[:, 1] - discount * sums[:, 2], has_enough(sums)  # [E, ages, N]
+    count, gap = (pooled(drawn, of.sum(axis=1)) for of in (sums[:, 0], gaps))  # [1 + R, N]
+    more, explains = _fitted(drawn, gaps[..., :-1], sums[:, 2:3, :, :-1])
+    last, reset, end_explains = _fitted(drawn, gaps, sums[:, 3:])
+    past = (last + reset) / discount, reset / discount
+    estimates = percentiles(np.stack([discount + more, explains, *past, end_explains], 1), enough)
     return Consistency(
         time_axis=axis,
         num_transitions=len(ages),
         num_ends=int((~goes_on).sum()),
-        gap=percentiles(gap, enough),
+        gap=percentiles(gap / np.maximum(count, 1.0), enough),
         discount=estimates[0],
-        discount_near=_fitted(drawn[:1], sums[:, 1:, :, near], discount)[0, 0],
-        discount_far=_fitted(drawn[:1], sums[:, 1:, :, ~near], discount)[0, 0],
-        explained=fitted[0, 3],
-        past_end=estimates[1],
-        past_reset=estimates[2],
+        discount_explains=estimates[1],
+        past_end=estimates[2],
+        past_reset=estimates[3],
+        end_explains=estimates[4],
     )
 
 
@@ -141,24 +141,23 @@ def _shifted(components: FloatArray) -> FloatArray:
     return np.concatenate([components[..., :-2], folded], axis=-1)
 
 
-def _fitted(drawn: FloatArray, sums: FloatArray, discount: float) -> FloatArray:
-    """Returns `[1 + R, 4]`: d, (b + c)/γ^w, c/γ^w and the share that they explain.
+def _fitted(drawn: FloatArray, gaps: FloatArray, causes: FloatArray) -> FloatArray:
+    """Returns `[n + 1, 1 + R]`: how much of each cause makes the gaps, and the share it explains.
 
-    They are fitted to sums `[E, 4, ages, n]` as `consistency_of` says. Products are taken between
-    different episodes only, where chance is independent: that of what follows would otherwise make
-    d too small.
+    Gaps are `[E, ages, i]`, causes `[E, n, ages, i]`; NaN where no cause is seen. Products are
+    taken between different episodes only, where chance is independent: that of what follows would
+    otherwise make the discount too small.
     """
-    sums = sums.reshape(len(sums), 4, -1)  # [E, 4, cells]
+    sums = np.concatenate([gaps[:, None], causes], axis=1)
     if not sums.size:
-        return np.full((len(drawn), 4), np.nan)
-    total = pooled(drawn, sums)  # [1 + R, 4, cells]
-    same = pooled(drawn**2, sums @ sums.transpose(0, 2, 1))  # [1 + R, 4, 4]
+        return np.full((sums.shape[1], len(drawn)), np.nan)
+    sums = sums.reshape(*sums.shape[:2], -1)  # [E, 1 + n, cells]
+    total = pooled(drawn, sums)  # [1 + R, 1 + n, cells]
+    same = pooled(drawn**2, sums @ sums.transpose(0, 2, 1))  # [1 + R, 1 + n, 1 + n]
     products = total @ total.transpose(0, 2, 1) - same
     solved = np.linalg.pinv(products[:, 1:, 1:], rcond=1e-10, hermitian=True)
-    d, b, c = factors = (solved @ products[:, 1:, :1])[..., 0].T  # 3 of [1 + R]
+    factors = (solved @ products[:, 1:, :1])[..., 0].T  # [n, 1 + R]
     explained = (factors * products[:, 1:, 0].T).sum(axis=0)
     size = np.where(products[:, 0, 0] > 0.0, products[:, 0, 0], np.nan)
-    seen = np.abs(total[:, 1:]).max(axis=2) > 0.0  # [1 + R, 3]
-    past = np.where(seen[:, 1:].any(axis=1), (b + c) / discount, np.nan)
-    reset = np.where(seen[:, 2], c / discount, np.nan)
-    return np.stack([np.where(seen[:, 0], d, np.nan), past, reset, explained / size], axis=1)
+    seen = total[:, 1:].any(axis=(1, 2))  # [1 + R]
+    return np.where(seen, np.stack([*factors, explained / size]), np.nan)

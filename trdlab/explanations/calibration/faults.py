@@ -1,6 +1,5 @@
 """Faults: what is wrong with a forecast, where the data tell it from the alternatives."""
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,9 +13,7 @@ from trdlab.explanations.words import forms_of
 from trdlab.statistics import FEWEST_EPISODES
 
 EXPLAINED = 0.95
-"""The share of the components that must fit what follows, for a fault between them to be named."""
-SLACK = 0.2
-"""How far the exponent of a discount may be from w, as a share of w, before it is a fault."""
+"""The share of what is wrong between components that a fault must account for, to be named."""
 
 _ROUNDING = 1e-9  # relative to the largest component
 
@@ -127,7 +124,7 @@ def discount_off(report: CalibrationReport) -> Iterator[Fields]:
 )
 def end_ignored(report: CalibrationReport) -> Iterator[Fields]:
     found = report.consistency
-    if found is not None and found.explained >= EXPLAINED and found.past_end.low > 0.5:
+    if found is not None and is_end_ignored(found):
         is_next = found.past_reset.low > 0.5
         what = "the start of the next one promises" if is_next else "it expects after that"
         yield {"share": found.past_end.value, "what": what, "is_next": is_next}
@@ -137,22 +134,26 @@ def faults(report: CalibrationReport) -> list[Claim]:
     """Returns what an implementation got wrong; nothing where there is doubt.
 
     - Rewards are expected too early, or too late, if other components fit surely better.
-    - The discount is wrong if x, where components are really multiplied by γ^x from one to the
-      next, is surely more than a fifth of w away from w, and on the same side for near components
-      and for far ones: else something is wrong, but not the discount. At w = 2, a forgotten power
-      gives 1.
-    - An end is ignored if surely more than half of what is expected after it counts.
+    - The discount is wrong if γ^x is between one component and the next, and x is surely nearest to
+      a whole number up to 2w, but not to w. At w = 2, a forgotten power gives 1.
+    - An end is ignored if what is expected after it surely counts once, rather than never or twice.
 
-    The last two are named only if hardly anything else is wrong between components, which is so if
-    `EXPLAINED` of them fits what follows.
+    The last two are named only if they may be nearly all that is wrong between components: they are
+    the same in all, of which a discount needs two (N = 3), and what is not learned yet is not.
     """
     return every(report, mistimed, discount_off, end_ignored)
 
 
 def is_discount_wrong(found: Consistency) -> bool:
     """Returns whether the discount is surely wrong (see `faults`)."""
-    gamma, width, whole = found.time_axis.gamma, found.time_axis.width, found.discount
-    parts = [of for of in (found.discount_near, found.discount_far) if not math.isnan(of)]
-    least, most = (gamma ** ((1.0 + sign * SLACK) * width) for sign in (1.0, -1.0))
-    is_wrong = min([whole.low, *parts]) > most or max([whole.high, *parts]) < least
-    return is_wrong and found.explained >= EXPLAINED
+    axis, measured = found.time_axis, found.discount
+    powers = [axis.gamma**x for x in range(2 * axis.width + 1) if x != axis.width]
+    half = axis.gamma**0.5
+    is_other = any(half * of < measured.low and half * measured.high < of for of in powers)
+    return is_other and axis.horizon > 2 and found.discount_explains.high >= EXPLAINED
+
+
+def is_end_ignored(found: Consistency) -> bool:
+    """Returns whether ends are surely ignored (see `faults`)."""
+    is_once = found.past_end.low > 0.5 and found.past_end.high < 1.5
+    return is_once and found.end_explains.high >= EXPLAINED

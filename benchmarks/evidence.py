@@ -29,7 +29,7 @@ CELLS, CHANCES = list(".#chHTC"), [0.55, 0.15, 0.08, 0.06, 0.06, 0.06, 0.04]
 WRONG = ("against-the-forecast", "no-difference")
 OFF = ("by-another-amount", "less-than-forecast")
 OPEN = ("too-few-tries", "too-close-to-tell")
-OUTCOMES = (*WRONG, *OFF, *OPEN, "came-as-forecast")
+OUTCOMES = (*WRONG, *OFF, *OPEN, "came-as-forecast", "came-exactly")
 
 
 def maps(count: int, folder: Path) -> Iterator[Agent]:

@@ -13,6 +13,7 @@ import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from docstrings import prepared
 
@@ -89,11 +90,12 @@ def _modules(package: Path, root: Path) -> Iterator[str]:
 def _sentences(package: Path, root: Path) -> Iterator[str]:
     heading = "## What it can say\n\nThe kinds of sentences, and when each is said.\n"
     for module in sorted(package.glob("[!_]*.py")):
+        known = _constants(module)
         rules = [
             (kind, says, ast.get_docstring(node))
             for node in _parsed(module).body
             if isinstance(node, ast.FunctionDef)
-            for kind, says in _rules(node)
+            for kind, says in _rules(node, known)
         ]
         if rules:
             about = _first(ast.get_docstring(_parsed(module))).rstrip(".")
@@ -105,13 +107,31 @@ def _sentences(package: Path, root: Path) -> Iterator[str]:
             yield f"`{kind}`\n\n:   {lines}\n"
 
 
-def _rules(function: ast.FunctionDef) -> Iterator[tuple[str, str]]:
+def _rules(function: ast.FunctionDef, known: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yields the kinds of claims that a function finds, each with its sentence."""
     for call in function.decorator_list:
-        if isinstance(call, ast.Call) and getattr(call.func, "attr", "") == "rule":
+        makes = getattr(call.func, "attr", "") if isinstance(call, ast.Call) else ""
+        if makes == "rule":
             given = {of.arg: ast.literal_eval(of.value) for of in call.keywords if of.arg == "kind"}
             kind = given.get("kind") or function.name.strip("_").replace("_", "-")
-            if isinstance(says := call.args[0], ast.Constant):
-                yield kind, says.value
+            yield kind, _value(call.args[0], known)
+        elif makes == "kinds":
+            yield from _value(call.args[0], known).items()
+
+
+def _constants(module: Path) -> dict[str, Any]:
+    """Returns the names of a module that stand for what is made of nothing but such names."""
+    known: dict[str, Any] = {}
+    for node in _parsed(module).body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            used = {of.id for of in ast.walk(node.value) if isinstance(of, ast.Name)}
+            if used <= known.keys():
+                known[node.targets[0].id] = _value(node.value, known)
+    return known
+
+
+def _value(node: ast.expr, known: dict[str, Any]) -> Any:
+    return eval(compile(ast.Expression(node), "docs", "eval"), {"__builtins__": {}}, known)
 
 
 def _shown(says: str) -> str:

@@ -274,6 +274,12 @@ def needs_long(dish):
 @COOKING.rule("{dish} is raw.", kind="raw")
 def _raw(dish): ...
 
+_SAYS = "{dish} is %s."
+
+@COOKING.kinds({"done": _SAYS % "done", "burnt": f"{_SAYS % 'burnt'}"})
+def outcome(dish):
+    """What came of it."""
+
 def bake(dish):
     """Bakes a dish.
 
@@ -311,6 +317,8 @@ def rooms(tmp_path: Path) -> Path:
                 "`needs-long`\n\n:   “<var>dish</var> needs <var>time</var> <var>much</var>.”\n",
                 "\n    Where it needs more than an hour (errata [P1][p1]).\n",
                 "`raw`\n\n:   “<var>dish</var> is raw.”\n",
+                "`done`\n\n:   “<var>dish</var> is done.”\n\n    What came of it.\n",
+                "`burnt`\n\n:   “<var>dish</var> is burnt.”\n",
             ],
         ),
         ("sentences: rooms", []),

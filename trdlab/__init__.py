@@ -37,18 +37,7 @@ __all__ = [
     "train",
 ]
 
-__getattr__ = lazily(
-    __name__,
-    {
-        "agents.agent": "Agent",
-        "decomposition": "RewardDecomposition",
-        "estimator": "Estimator Future",
-        "policies.protocol": "Policy",
-        "time_axis": "TimeAxis",
-        "training.loading": "load",
-        "verbs": "agent calibrate compare explain solve train",
-    },
-)
+__getattr__ = lazily(__name__)
 
 # A command started from a notebook inherits the notebook's backend, which may not be installed
 # here, and then matplotlib could not even be imported.

@@ -11,11 +11,4 @@ if TYPE_CHECKING:
     from trdlab.agents.naming import find_agent as find_agent
     from trdlab.agents.naming import find_pair as find_pair
 else:
-    __getattr__ = lazily(
-        __name__,
-        {
-            "agent": "Agent",
-            "exact": "gridworld_agent tabular_agent",
-            "naming": "find_agent find_pair",
-        },
-    )
+    __getattr__ = lazily(__name__)

@@ -10,11 +10,4 @@ if TYPE_CHECKING:
     from trdlab.atari.names import find_game as find_game
     from trdlab.atari.names import game_names as game_names
 else:
-    __getattr__ = lazily(
-        __name__,
-        {
-            "environments": "AtariEnvironments",
-            "game": "AtariGame",
-            "names": "find_game game_names",
-        },
-    )
+    __getattr__ = lazily(__name__)

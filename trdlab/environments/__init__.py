@@ -16,11 +16,4 @@ if TYPE_CHECKING:
     from trdlab.environments.gym import GymEnvironments as GymEnvironments
     from trdlab.environments.making import make_environment as make_environment
 else:
-    __getattr__ = lazily(
-        __name__,
-        {
-            "batches": "in_batches",
-            "gym": "GymEnvironments",
-            "making": "make_environment",
-        },
-    )
+    __getattr__ = lazily(__name__)

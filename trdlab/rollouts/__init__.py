@@ -7,15 +7,11 @@ from trdlab.lazy import lazily
 if TYPE_CHECKING:
     from trdlab.rollouts.branches import Branching as Branching
     from trdlab.rollouts.branches import Copying as Copying
+    from trdlab.rollouts.episodes import Episode as Episode
     from trdlab.rollouts.episodes import Recording as Recording
     from trdlab.rollouts.episodes import collect as collect
+    from trdlab.rollouts.evaluation import Evaluation as Evaluation
     from trdlab.rollouts.evaluation import evaluate as evaluate
+    from trdlab.rollouts.playing import Playing as Playing
 else:
-    __getattr__ = lazily(
-        __name__,
-        {
-            "branches": "Branching Copying",
-            "episodes": "Recording collect",
-            "evaluation": "evaluate",
-        },
-    )
+    __getattr__ = lazily(__name__)

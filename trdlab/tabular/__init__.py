@@ -31,18 +31,4 @@ if TYPE_CHECKING:
     from trdlab.tabular.windows import WindowBuilder as WindowBuilder
     from trdlab.tabular.windows import Windows as Windows
 else:
-    __getattr__ = lazily(
-        __name__,
-        {
-            "environments": "from_environment",
-            "episodes": "ModelEnvironments",
-            "learned": "LearnedTable",
-            "learning": "learn",
-            "models": "from_arrays",
-            "named": "Coordinate TabularWorld",
-            "operator": "OperatorTable operator_table",
-            "toytext": "make_world tabular_world",
-            "uncertainty": "Spread outcomes spread",
-            "windows": "WindowBuilder Windows",
-        },
-    )
+    __getattr__ = lazily(__name__)

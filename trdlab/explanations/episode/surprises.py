@@ -56,7 +56,10 @@ def _turns(played: Played) -> tuple[Found, ...]:
     return tuple(_turn(played, row) for row in range(len(played.revision)))
 
 
-EPISODES.kinds(_SAYS)(_turns)
+@EPISODES.kinds(_SAYS)
+def turns(played: Played) -> tuple[Found, ...]:
+    """Steps after which something else was expected than before, with the main reason."""
+    return _turns(played)
 
 
 def _turn(played: Played, row: int) -> Found:

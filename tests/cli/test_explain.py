@@ -102,7 +102,7 @@ def test_the_story_of_an_episode_as_text_as_json_and_as_a_picture(explain):
     code, out, err = explain(*words, "--out", "pictures")
     assert code == 0
     assert "loop,slip=0.2 · the episode with seed 3" in out
-    assert "At the start the agent expected 1.14 in all, most of it after the" in out
+    assert "At the start, all that the agent expected was worth 1.14, most of it after" in out
     assert "The episode was cut off after 100 steps." in out
     assert err == "Picture: pictures/episode-seed-3.png\n"
     _, out, _ = explain(*words, "--json")

@@ -169,7 +169,7 @@ def test_to_fall_off_the_cliff_is_an_alternative_and_when_it_costs_is_told_first
     capsys: pytest.CaptureFixture[str],
 ):
     _, out, _ = run(capsys, CLIFF, "--N", "14")
-    assert "What comes at once decides: up costs 1 then and right costs 100." in out
+    assert "What comes at once decides: up loses 1 and right loses 100." in out
     right = next(line for line in out.splitlines() if line.startswith("right"))
     assert "stays" not in right
 

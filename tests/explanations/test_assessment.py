@@ -199,7 +199,7 @@ def test_copies_that_share_their_chance_do_not_tell_that_all_can_be_known():
     assert report.chance
     said = [claim.sentence for part in calibration.sections(report) for claim in part.claims]
     assert not any("all that comes can be known" in sentence for sentence in said)
-    assert any("the copies may share their chance" in sentence for sentence in said)
+    assert any("the replays may share their luck" in sentence for sentence in said)
     tried = try_out(agent, "action 0", "action 1", copies=3).found
     assert tried.same_every_time
     assert tried.observed.low[0] < tried.observed.high[0]  # though all six copies went alike

@@ -67,7 +67,7 @@ def test_the_sections_answer_why_what_whose_and_how_far():
     assert told["What to expect of down"].startswith("With down, the first reward comes 1 step")
     assert told["Whose future"].startswith("After the first action, the optimal policy acts.")
     assert told["Tried out"].startswith("As forecast, down was worth 0.266 more than up.")
-    assert told["How far to trust it"].startswith("About ")
+    assert told["How far to trust it"].startswith("For ")
 
 
 def test_the_answer_begins_with_how_the_agent_does():

@@ -266,7 +266,8 @@ def test_good_bad_and_not_tested_are_three_things():
     report = judge(Future("a policy"), [one(i) for i in range(50)])  # type: ignore[misc]
     assert report.trust.status == ("good", "bad", "bad", "not tested")
     assert [claim.sentence for claim in verdicts(report)] == [
-        "For what comes at once, the agent's forecasts are right: that was the same every time.",
+        "For what comes at once, the agent's forecasts are right (to a tenth): what came never "
+        "varied.",
         "For what comes 1 to 2 steps later, the agent's forecasts are wrong: 0.1 on average, "
         "but 0.75 came every time.",
         "For what comes after the first 3 steps, the agent's forecasts were not tested: episodes "

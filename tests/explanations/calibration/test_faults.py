@@ -197,7 +197,7 @@ def test_what_a_young_agent_is_told():
         "The agent expects too little of what comes 3 to 7 steps later: "
     )
     assert late.sentence.endswith(" on average, where 1.56 came.")
-    assert share.sentence == "In the first 8 steps the agent expects 61 % of what comes."
+    assert share.sentence == "In the first 8 steps the agent expects 0.613 times what comes."
 
 
 def cut(rows: FloatArray, axis: TimeAxis) -> Episode:

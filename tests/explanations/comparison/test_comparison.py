@@ -227,10 +227,10 @@ def test_it_is_told_whose_forecasts_can_be_trusted():
     assert (good.trust.last_step, bad.trust.last_step) == (3, 1)
     whom = [claim.sentence for claim in trusted(comparison)]
     assert any(
-        re.match("A: about what comes .*first 4 steps, .*better than a guess", x) for x in whom
+        re.match("A: for what comes .*first 4 steps, .*better than a guess", x) for x in whom
     )
     assert any(
-        re.match("B: about what comes .*first 2 steps, .*better than a guess", x) for x in whom
+        re.match("B: for what comes .*first 2 steps, .*better than a guess", x) for x in whom
     )
     assert list(dict.fromkeys(progress.what for progress in heard)) == [
         "episodes to compare at",

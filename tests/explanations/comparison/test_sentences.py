@@ -247,7 +247,7 @@ def test_the_page_says_what_matters_most_first():
     found = lines(real()[0])
     assert found[0] == "A: ledge · B: ledge,slip=0.3"
     assert found[1] == "γ = 0.95 · N = 4 · w = 1 · both act in gridworld:ledge"
-    assert found[3].split() == ["reward", "at", "A", "B", "B", "−", "A", "95", "%", "interval"]
+    assert found[3].split() == ["expected", "at", "A", "B", "B", "−", "A", "95", "%", "interval"]
     assert [line.split()[0] for line in found[4:9]] == ["t", "t+1", "t+2", "t+3", "t+4…∞"]
     assert found[9].startswith("all of it")
     assert found[11] == "A expects more than B: 0.801 against 0.588 on average."
@@ -261,7 +261,7 @@ def test_the_details_tell_all_under_their_questions():
     assert headings == [
         "Who expects more, and when",
         "Where they are furthest apart",
-        "How far to trust each",
+        "How far to trust each where A acts",
         "What this rests on",
     ]
     assert [line for line in found if line in headings] == headings

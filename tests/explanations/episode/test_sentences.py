@@ -210,7 +210,7 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
 
 def test_a_story_reads_well():
     assert said(tell(real()[0]).claims) == [
-        "At the start the agent expected 3.52 in all.",
+        "At the start, all that the agent expected was worth 3.52.",
         "A reward of 1 at step 3 was foreseen 3 steps before, as early as it can be told.",
         "No step brought a surprise.",
         "The episode ended after 5 steps.",

@@ -94,7 +94,7 @@ def test_a_cost_is_not_called_a_reward():
     hurt = played(foretold([0.0, -0.5]), [0.0, -2.0])
     assert "mainly because a cost of 2 came" in said(tell(hurt).moments)[0]
     assert said(tell(hurt).start) == [
-        "At the start the agent expected -0.25 in all, most of it 1 step later."
+        "At the start, all that the agent expected was worth -0.25, most of it 1 step later."
     ]
 
 
@@ -129,7 +129,7 @@ def test_key_moments_are_spread_over_the_episode():
 def test_where_nothing_surprises_nothing_is_made_of_it():
     story = tell(played(foretold([0.0, 1.0, 0.0, 4.0]), [0.0, 1.0, 0.0, 4.0]))
     assert [claim.kind for claim in story.claims] == [
-        "expected-mostly",
+        "expected-in-all",
         "foreseen-fully",
         "nothing-changed",
         "ended",

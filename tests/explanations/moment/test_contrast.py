@@ -221,7 +221,8 @@ def test_what_makes_up_for_a_lead_follows_it():
     of = pair([0.0, 0.0, 3.0], [1.0, 1.0, 0.2])
     assert [claim.kind for claim in in_brief(of)[:3]] == ["more-immediate", "makes-up", "better"]
     assert said(of, "makes-up") == [
-        "But what comes after the first 2 steps decides: there a is ahead by 2.8, on average."
+        "But what comes after the first 2 steps decides: with a, that part is worth 2.8 "
+        "more, on average."
     ]
 
 
@@ -253,7 +254,7 @@ def test_a_residual_in_which_an_action_pays_more_speaks_for_it():
     of = choice("tie", TimeAxis(0.9, 1), action="left", foil="right")
     texts = [claim.sentence for claim in told(of)]
     assert texts[:2] == [  # 19 · 0.9 and 20 · 0.9²
-        "What comes after the first step decides: left pays 17.1 then and right pays 16.2.",
+        "What comes after the first step decides: left gains 17.1 and right gains 16.2.",
         "In total right brings 20 and left 19.",
     ]
 

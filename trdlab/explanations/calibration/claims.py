@@ -66,7 +66,7 @@ def some_ended(report: CalibrationReport) -> Iterator[Fields]:
 
 # ---- how far to trust it -------------------------------------------------------------------------
 
-_FEW = "For {span:comes}, {whose:text} were tested in only {few:text}"
+_FEW = "For {span:comes}, {whose:text} were tested in {few:text}"
 
 
 @REPORTS.kinds(
@@ -87,7 +87,7 @@ _FEW = "For {span:comes}, {whose:text} were tested in only {few:text}"
 def judged(report: CalibrationReport) -> Found:
     cut = "episodes were cut off before" if report.judged.truncated else "no episode shows it"
     unseen = (
-        "before that, the test always took a random action" if report.judged.epsilon > 0.0 else cut
+        "by then, the test had always taken a random action" if report.judged.epsilon > 0.0 else cut
     )
     yield from _verdicts(OWN, report.calibration, unseen)
     if report.foils is not None:
@@ -202,7 +202,7 @@ def _known(report: CalibrationReport) -> list[Claim]:
         ),
         "differs-later": (
             "Over all steps played, {share:percent} of the difference between its best and its "
-            "next best action comes {component:when}."
+            "second best action comes {component:when}."
         ),
     }
 )

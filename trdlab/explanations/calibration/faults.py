@@ -43,7 +43,7 @@ def mistimed(report: CalibrationReport) -> Iterator[Fields]:
         yield {"steps": abs(shift) * report.time_axis.width, "late": late}
 
 
-@REPORTS.rule("{span:span} the agent expects {share:number} times as much as comes.")
+@REPORTS.rule("{span:span} the agent expects {share:number} times what comes.")
 def amount_off(report: CalibrationReport) -> Iterator[Fields]:
     if report.errors is not None and is_off(report.errors.amount):
         yield {"span": (0, report.time_axis.horizon - 1), "share": report.errors.amount.value}

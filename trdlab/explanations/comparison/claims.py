@@ -18,9 +18,11 @@ def in_brief(comparison: Comparison) -> list[Claim]:
     """Returns who expects more, when, whether they would do the same, and whom to trust."""
     told = [*first(comparison, nothing_differs, *how_much), *_when(comparison)[:1]]
     told += every(comparison, agreement)
-    said = every(comparison, trusted)
-    trust = (claim for side in SIDES for claim in [of for of in said if of.side == side][1:][-1:])
-    return list(at_first([*told, *trust]))
+    for side in SIDES:
+        verdicts = [of for of in every(comparison, trusted) if of.side == side][1:]
+        tested = [of for of in verdicts if of.about not in ("unseen", "silent")]
+        told += (tested or verdicts)[-1:]  # what is wrong, if anything is
+    return list(at_first(told))
 
 
 def sections(comparison: Comparison) -> tuple[Section, ...]:
@@ -193,7 +195,8 @@ def trusted(comparison: Comparison) -> Iterator[Fields]:
     """What matters most of the calibration of each."""
     for side, report in zip(SIDES, comparison.reports, strict=True):
         for claim in [] if report is None else in_brief_of_report(report):
-            yield {"side": side, "said": claim.sentence[0].lower() + claim.sentence[1:]}
+            said = claim.sentence[0].lower() + claim.sentence[1:]
+            yield {"side": side, "said": said, "about": claim.kind}
 
 
 @COMPARISONS.rule(

@@ -96,10 +96,11 @@ def key_rows(played: Played, count: int, *told: range) -> list[int]:
 
 @EPISODES.kinds(
     {
-        "expected-nothing": "At the start the agent expected no rewards.",
-        "expected-in-all": "At the start the agent expected {value:number} in all.",
+        "expected-nothing": "At the start, the agent expected no rewards.",
+        "expected-in-all": "At the start, all that the agent expected was worth {value:number}.",
         "expected-mostly": (
-            "At the start the agent expected {value:number} in all, most of it {component:when}."
+            "At the start, all that the agent expected was worth {value:number}, most of it "
+            "{component:when}."
         ),
     }
 )

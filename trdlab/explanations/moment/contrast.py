@@ -224,8 +224,8 @@ def leads(choice: Choice) -> Iterator[Found]:
             "{leader_sum:gains} and {other} {other_sum:gains}{averages:averages}."
         ),
         "makes-up": (
-            "But what comes {component:when} decides: there {leader} is ahead by "
-            "{more:number}{averages:averages}."
+            "But what comes {component:when} decides: with {leader}, that part is worth "
+            "{more:number} more{averages:averages}."
         ),
     }
 )

@@ -56,16 +56,20 @@ def _forms(trial: Trial) -> dict[str, Form]:
     axis, whole = trial.found.time_axis, trial.found.whole
     forms = forms_of(axis, trial.seconds_per_step)
 
-    def at(component: int | None, digits: int) -> str:
+    def then(component: int | None, digits: int) -> str:
         if component is not None:
-            return forms["when"].show(component, digits) + ", "
-        return "" if whole else forms["within"].show(axis.num_steps - 1, digits) + ", "
+            return " " + forms["when"].show(component, digits)
+        return "" if whole else " " + forms["within"].show(axis.num_steps - 1, digits)
+
+    def at(component: int | None, digits: int) -> str:
+        told = then(component, digits).strip()
+        return f"{told}, " if told else ""
 
     def does(in_all: str, of_a_part: str) -> Form:
         return Form(lambda component, _: in_all if component is None and whole else of_a_part)
 
     gained, leads = does("was worth", "gained"), does("is worth more than", "is ahead of")
-    return forms | {"at": Form(at), "gained": gained, "leads": leads}
+    return forms | {"at": Form(at), "then": Form(then), "gained": gained, "leads": leads}
 
 
 TRIALS = Language[Trial]("this trial", _forms)
@@ -106,12 +110,12 @@ _MORE = "{component:at}{more} {component:gained} %s more than {less}"
             "though {said:number} more was forecast."
         ),
         "too-few-tries": (
-            "{copies:count} tries of each are too few to tell whether {component:at}{more} "
-            "{component:leads} {less}; about {enough:count} would do."
+            "{copies:count} tries of each are too few to tell whether {more} "
+            "{component:leads} {less}{component:then}; about {enough:count} would do."
         ),
         "too-close-to-tell": (
-            "Tries cannot tell whether {component:at}{more} {component:leads} {less}: "
-            "they are too close."
+            "Tries cannot tell whether {more} {component:leads} {less}{component:then}: they are "
+            "too close."
         ),
     }
 )

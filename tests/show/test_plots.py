@@ -150,6 +150,8 @@ def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
     assert heights(action) == [1.0, 0.9, 1.5]
     assert heights(foil) == [1.0, -0.8, 1.5]
     assert [cut_texts(ax) for ax in (action, foil, contrast)] == [["94.50"], ["2.00"], ["92.50"]]
+    unsure = replace(found, error=np.array([0.1, 0.1, 6.0]))  # its whisker is beyond the scale, too
+    assert cut_texts(moment_figure(Choice(unsure, "go", "stay")).axes[0]) == ["94.50"]
 
 
 def test_a_residual_is_shown_whole_where_the_rest_is_next_to_nothing():

@@ -157,7 +157,8 @@ def draw_whiskers(
 ) -> None:
     """Draws lines between `ends` `[2, K]`, with `points` `[K]` on them, as far as the scale goes.
 
-    What leaves it is an arrow with its number; of many such ends the furthest has it.
+    What leaves it is an arrow with its number; of many such ends the furthest has it. Of one that
+    is gone as a whole the bar is cut off, too, and has its own arrow; `points` have none but this.
     """
     known = np.isfinite(ends).all(axis=0)
     x, ends = x[known], ends[:, known]
@@ -167,7 +168,8 @@ def draw_whiskers(
     for which, row in enumerate(ends):
         inside = scale.holds(row)
         ax.plot(x[inside], row[inside], "_", color=style.INK, markersize=5, zorder=4)
-        out = np.flatnonzero(~inside & (~gone | (far == which)))  # of what is gone its far end
+        is_end = ~gone if points is None else ~gone | (far == which)
+        out = np.flatnonzero(~inside & is_end)
         telling = out if len(out) <= _MOST_CUTS else out[[np.abs(row[out]).argmax()]]
         for i in out:
             _cut(ax, x[i], row[i], scale, style.INK, is_told=i not in telling)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.environments import Environments, NotParallel
 from trdlab.environments.batches import Make
 from trdlab.errors import InputError
 from trdlab.estimator import Future
@@ -18,6 +19,7 @@ from trdlab.rollouts.playing import Playing
 from trdlab.time_axis import TimeAxis
 
 FAR = int(np.iinfo(np.int64).max)
+_NEVER = 2**40  # steps: no episode is so long
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +32,10 @@ class Experience:
         actions: `[M]`; of no moment in a last row, nor are the rewards.
         rewards: `[M]`, as the future counts them.
         ends: `[M]`, whether nothing is left to come after a step.
-        forced: `[M]`, whether the action was forced, and not drawn from the policy.
+        until: `[M]`, the number of the row after each at which the policy would act no more, had
+            the episode gone on for so long: at which another action is forced, or the time is up.
+            It can lie beyond the last row, so that what is left out because of it does not depend
+            on whether an episode had ended by then.
         last: `[M]`, the number of the last row of the same episode.
     """
 
@@ -39,7 +44,7 @@ class Experience:
     actions: IntArray
     rewards: FloatArray
     ends: BoolArray
-    forced: BoolArray
+    until: IntArray
     last: IntArray
 
     def __len__(self) -> int:
@@ -55,11 +60,6 @@ class Experience:
         """`[M]`: the next step after which nothing is left to come; `FAR` if none is known."""
         return _next(self.ends)
 
-    @cached_property
-    def _next_forced(self) -> IntArray:
-        """`[M]`: the next forced action after each row."""
-        return np.append(_next(self.forced)[1:], FAR)
-
     def ahead(self, rows: IntArray, axis: TimeAxis, most: int | None = None) -> "Ahead":
         """Returns what followed some steps, as far as the policy itself acted after the first.
 
@@ -71,8 +71,8 @@ class Experience:
         """
         w, reach = axis.width, max(axis.horizon, 1)
         most = reach if most is None else min(most, reach)
-        end, last = self._next_end[rows], self.last[rows]  # [K] each
-        stop = np.minimum(self._next_forced[rows], last)  # [K], the first step not to be counted
+        end, last, until = self._next_end[rows], self.last[rows], self.until[rows]  # [K] each
+        stop = np.minimum(until, last)  # [K], the first step not to be counted
         over = (end < stop) & (end < rows + most * w)  # [K]
         span = np.where(over, reach, np.minimum((stop - rows) // w, most))  # [K]
         steps = np.arange(reach * w)
@@ -81,7 +81,8 @@ class Experience:
         paid = np.where(at < told, self.rewards[np.minimum(at, last[:, None])], 0.0)
         paid *= axis.gamma**steps
         rewards = paid.reshape(len(rows), reach, w).sum(axis=2)  # [K, L]
-        return Ahead(rewards, span, over, np.minimum(rows + span * w, last))
+        follows = np.minimum(rows + span * w, last)
+        return Ahead(rewards, span, over, follows, (until - rows) // w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,17 +94,23 @@ class Ahead:
         span: `[K]`, of how many that is known.
         over: `[K]`, whether nothing is left to come after that; `span` is L then.
         follows: `[K]`, the row at which all that is not known is still to come.
+        own: `[K]`, for how many groups the policy acts, were the episode to go on.
     """
 
     rewards: FloatArray
     span: IntArray
     over: BoolArray
     follows: IntArray
+    own: IntArray
 
     def known(self, axis: TimeAxis) -> BoolArray:
-        """Returns `[K, N+1]`: what is known without any expectation of what is still to come."""
-        explicit = np.arange(axis.horizon) < self.span[:, None]
-        return np.column_stack([explicit, self.over])
+        """Returns `[K, N]`: what is known without any expectation of what is still to come.
+
+        Of steps at which others acted later nothing is known of that, even where the episode had
+        ended by then: it would look likelier to end than it is.
+        """
+        own = np.minimum(self.span, self.own)[:, None]
+        return np.asarray(np.arange(axis.horizon) < own)
 
     def target(self, axis: TimeAxis, following: FloatArray) -> FloatArray:
         """Returns the components `[K, N+1]`: what came, and from there on what is expected.
@@ -114,7 +121,8 @@ class Ahead:
             axis: γ, N and w.
             following: `[K, N+1]`, what is expected in the rows that follow, of the policy's action.
 
-        >>> ahead = Ahead(np.array([[1.0, 0.0]]), np.array([1]), np.array([False]), np.array([1]))
+        >>> one = np.array([1])
+        >>> ahead = Ahead(np.array([[1.0, 0.0]]), one, np.array([False]), one, one)
         >>> ahead.target(TimeAxis(0.5, 2), np.array([[2.0, 4.0, 6.0]]))
         array([[1., 1., 5.]])
         """
@@ -167,16 +175,24 @@ def gather(
     rng, taken, batch, parts = np.random.default_rng(seed), 0, 0, list[Experience]()
     while taken < steps:
         own = int(np.random.SeedSequence([seed, batch]).generate_state(1)[0] >> 1)
-        with closing(make(num_envs, own)) as environments:
+        with closing(_some(make, num_envs, own)) as environments:
             playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
             parts.append(_played(playing, future, share, pause, rng))
         taken, batch = taken + len(parts[-1].steps), batch + 1
         tell(taken)
-    starts = np.cumsum([0, *map(len, parts[:-1])])
-    lasts = [part.last + start for part, start in zip(parts, starts, strict=True)]
-    named = (of.name for of in fields(Experience) if of.name != "last")
-    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in named}
-    return Experience(**columns, last=np.concatenate(lasts))
+    starts = np.repeat(np.cumsum([0, *map(len, parts[:-1])]), [len(part) for part in parts])
+    names = (of.name for of in fields(Experience))
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    moved = {name: columns[name] + starts for name in ("until", "last")}
+    return Experience(**columns | moved)
+
+
+def _some(make: Make, num_envs: int, seed: int) -> Environments:
+    """Returns so many environments, or one where there can be but one."""
+    try:
+        return make(num_envs, seed)
+    except NotParallel:
+        return make(1, seed)
 
 
 def _played(
@@ -186,6 +202,7 @@ def _played(
     count, num_actions = len(playing.running), playing.environments.num_actions
     log: list[tuple[Any, ...]] = []  # of some episodes a row each
     free = np.zeros(count, dtype=np.int64)  # [B], from which step on an action may be forced
+    coin = np.zeros(count, dtype=np.int64)  # [B], the step at which the next one would have been
     while playing.running.any():
         running, seen, turn = playing.running, playing.stack.observations, playing.turn()
         seen = seen[running]  # a copy: what is seen changes with the step
@@ -198,14 +215,22 @@ def _played(
         log.append((np.flatnonzero(running), seen, turn.probabilities, *told))
         if playing.finished.any():
             over = np.flatnonzero(playing.finished)
+            wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
+            coin[over] = np.maximum(playing.steps, free[over]) + wait
             nothing = np.zeros(len(over))
             none = nothing > 0.0
             log.append((over, *playing.last_seen(), nothing.astype(np.int64), nothing, none, none))
     episode, *columns = (np.concatenate(column) for column in zip(*log, strict=True))
-    order = np.argsort(episode, kind="stable")
-    lengths = np.bincount(episode)
-    last = np.repeat(lengths.cumsum() - 1, lengths)
-    return Experience(*(*(column[order] for column in columns), last))
+    order, lengths = np.argsort(episode, kind="stable"), np.bincount(episode)
+    *columns, were_forced = (column[order] for column in columns)
+    last = np.repeat(lengths.cumsum() - 1, lengths)  # [M]
+    first = np.repeat(lengths.cumsum() - lengths, lengths)  # [M]
+    until = np.append(_next(were_forced)[1:], FAR)
+    until = np.where(until < last, until, first + np.repeat(coin, lengths))
+    own = None if future.time_limit_ends else playing.environments.time_limit
+    limits = [limit for limit in (own, playing.max_steps) if limit is not None]
+    until = np.minimum(until, first + min(limits, default=_NEVER))
+    return Experience(*(*columns, until, last))
 
 
 def _next(flags: BoolArray) -> IntArray:

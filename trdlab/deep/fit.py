@@ -26,8 +26,9 @@ from trdlab.time_axis import TimeAxis
 Method = Literal["mixed", "regression", "td"]
 
 _LEAST_SCALE = 1e-6  # of the largest: a component that hardly pays is not blown up to its size
-_FALLS = 3  # times that the learning rate falls before learning stops
+_FALLS = 5  # times that the learning rate falls before learning stops
 _FALL = 0.3  # what is left of it each time
+_LAG = 1e-2  # of what is expected: so much the target network may lag behind before it counts
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,9 @@ class FitSettings:
     learning_rate: float = 1e-3
     batch_size: int = 256
     check_every: int = 200
-    patience: int = 4
+    patience: int = 3
     most_updates: int = 20_000
-    sync_every: int = 100
+    sync_every: int = 50
     held_out: float = 0.1
     seed: int = 0
 
@@ -126,6 +127,10 @@ class Fit:
         )
         self._learned, self._kept = self._split()
         self.scale = self._scale()
+        ends = np.array([experience.rewards.min(), experience.rewards.max()])  # of one step
+        most = np.append(np.ones(axis.horizon), 1.0 / (1.0 - axis.gamma**axis.width))
+        group = (axis.gamma ** np.arange(axis.width)).sum() * axis.discounts * most  # [N+1]
+        self._possible = np.minimum(ends[0], 0.0) * group, np.maximum(ends[1], 0.0) * group
         _standardise(self.network, experience.observations[self._learned])
         self.target_network = deepcopy(self.network)
         self.optimizer = torch.optim.Adam(
@@ -133,15 +138,19 @@ class Fit:
         )
         self.num_updates = 0
         self._known = self._held_out()
+        self._settled = self._syncs() * self.settings.sync_every
 
     def run(self, tell: Callable[[FitProgress], None] = lambda progress: None) -> FitProgress:
-        """Learns until held-out error stops falling, and keeps the best network."""
-        best, kept, waited, falls = self.error(), deepcopy(self.network.state_dict()), 0, 0
+        """Learns until held-out error stops falling, and keeps the best network.
+
+        What is expected of what is not known has to settle first, and is no part of that error.
+        """
+        best, kept, waited, falls = np.inf, deepcopy(self.network.state_dict()), 0, 0
         while self.num_updates < self.settings.most_updates and falls <= _FALLS:
             for _ in range(self.settings.check_every):
                 self.update()
             error = self.error()
-            if error < best:
+            if error < best or self.num_updates < self._settled:
                 best, kept, waited = error, deepcopy(self.network.state_dict()), 0
             else:
                 waited += 1
@@ -207,12 +216,13 @@ class Fit:
         with torch.inference_mode():
             following = self._components(self.target_network, ahead.follows).numpy()
         likely = self.experience.probabilities[ahead.follows][:, None]  # [K, 1, A]
-        expected = (likely @ following)[:, 0] * self.scale  # [K, N+1]
+        expected = np.clip((likely @ following)[:, 0] * self.scale, *self._possible)  # [K, N+1]
         target = ahead.target(self.axis, expected.astype(np.float64)) / self.scale
-        counts = np.broadcast_to((ahead.span > 0)[:, None], target.shape)
-        if method == "regression":
-            reached = ahead.span == ahead.rewards.shape[1]  # from there on the residual is expected
-            counts = ahead.known(self.axis) | (np.eye(target.shape[1])[-1] > 0) & reached[:, None]
+        counts = np.broadcast_to((np.minimum(ahead.span, ahead.own) > 0)[:, None], target.shape)
+        if method == "regression":  # the residual is expected where all before it is known
+            reach = ahead.rewards.shape[1]
+            whole = np.minimum(ahead.span, ahead.own) >= reach
+            counts = np.column_stack([ahead.known(self.axis), whole])
         return _tensor(target), _tensor(counts)
 
     def _split(self) -> tuple[IntArray, IntArray]:
@@ -230,7 +240,7 @@ class Fit:
         """Returns `[N+1]`: the root mean square of what came, and what the residual could be."""
         rows = self.rng.choice(self._learned, min(len(self._learned), 20_000), replace=False)
         ahead = self.experience.ahead(rows, self.axis)
-        known = ahead.known(self.axis)[:, :-1]  # [K, N]
+        known = ahead.known(self.axis)  # [K, N]
         came = ahead.rewards[:, : self.axis.horizon]
         size = np.sqrt((came**2 * known).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
         paid = np.abs(self.experience.rewards[rows]).mean()
@@ -240,6 +250,14 @@ class Fit:
         scale = np.append(size, residual)
         return np.asarray(np.maximum(scale, max(_LEAST_SCALE * scale.max(), 1e-30)))
 
+    def _syncs(self) -> int:
+        """Returns how often the target network is copied until what is expected has settled."""
+        most = 1 if self.settings.method == "td" else None
+        rows = self.rng.choice(self._learned, min(len(self._learned), 10_000))
+        ahead = self.experience.ahead(rows, self.axis, most)
+        left = np.where(ahead.over, 0.0, self.axis.gamma ** (self.axis.width * ahead.span)).mean()
+        return int(np.ceil(np.log(_LAG) / np.log(left))) if 0.0 < left < 1.0 else 1
+
     def _held_out(self) -> tuple[IntArray, FloatArray, Any, FloatArray]:
         """Returns held-out steps, what came of them, where that is known, and its mean."""
         rows = self._kept
@@ -247,7 +265,9 @@ class Fit:
             rows = self.rng.choice(rows, 20_000, replace=False)
         ahead = self.experience.ahead(rows, self.axis)
         nothing = np.zeros((len(rows), self.axis.num_components))
-        came, known = ahead.target(self.axis, nothing), ahead.known(self.axis)
+        came = ahead.target(self.axis, nothing)
+        rest = ahead.over if self.axis.horizon == 0 else np.zeros(len(rows), dtype=np.bool_)
+        known = np.column_stack([ahead.known(self.axis), rest])
         constant = (came * known).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
         return rows, came, known, constant
 

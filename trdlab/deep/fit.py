@@ -104,6 +104,8 @@ class Fit:
     Attributes:
         network: it tells components as shares of `scale`.
         scale: `[N+1]`, the size of each component.
+        possible: `[2, N+1]`, what components would be if every step paid the least, or the most,
+            that one did.
 
     Raises:
         InputError: there is no network for such observations, or there are fewer than two episodes.
@@ -130,7 +132,7 @@ class Fit:
         ends = np.array([experience.rewards.min(), experience.rewards.max()])  # of one step
         most = np.append(np.ones(axis.horizon), 1.0 / (1.0 - axis.gamma**axis.width))
         group = (axis.gamma ** np.arange(axis.width)).sum() * axis.discounts * most  # [N+1]
-        self._possible = np.minimum(ends[0], 0.0) * group, np.maximum(ends[1], 0.0) * group
+        self.possible = np.outer([min(ends[0], 0.0), max(ends[1], 0.0)], group)
         _standardise(self.network, experience.observations[self._learned])
         self.target_network = deepcopy(self.network)
         self.optimizer = torch.optim.Adam(
@@ -203,7 +205,7 @@ class Fit:
         with torch.no_grad():
             network.head.weight.mul_(rows[:, None])
             network.head.bias.mul_(rows)
-        return NetworkEstimator(network, self.axis, future)
+        return NetworkEstimator(network, self.axis, future, possible=self.possible)
 
     def _components(self, network: DecompositionNetwork, rows: IntArray) -> torch.Tensor:
         told: torch.Tensor = network(torch.from_numpy(self.experience.observations[rows]))
@@ -216,7 +218,7 @@ class Fit:
         with torch.inference_mode():
             following = self._components(self.target_network, ahead.follows).numpy()
         likely = self.experience.probabilities[ahead.follows][:, None]  # [K, 1, A]
-        expected = np.clip((likely @ following)[:, 0] * self.scale, *self._possible)  # [K, N+1]
+        expected = np.clip((likely @ following)[:, 0] * self.scale, *self.possible)  # [K, N+1]
         target = ahead.target(self.axis, expected.astype(np.float64)) / self.scale
         counts = np.broadcast_to((np.minimum(ahead.span, ahead.own) > 0)[:, None], target.shape)
         if method == "regression":  # the residual is expected where all before it is known

@@ -11,14 +11,13 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor, nn
-from torch.nn.utils import skip_init
 
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.errors import InputError, closest
 
 Weights = Mapping[str, npt.NDArray[Any]]
 
-_blank: Any = skip_init  # PyTorch tells no types of it; no chance is used up for weights
+_NOWHERE = "meta"  # where layers are made: their weights come later, and cost no chance
 _AGAIN = "Save the agent again."
 
 ACTIVATIONS: Mapping[str, type[nn.Module]] = {
@@ -82,7 +81,9 @@ def dense(
             )
     layers: list[nn.Module] = []
     for name, matrix in zip(names, matrices, strict=True):
-        linear = _blank(nn.Linear, matrix.shape[1], len(matrix), bias=f"{name}.bias" in weights)
+        linear = nn.Linear(
+            matrix.shape[1], len(matrix), bias=f"{name}.bias" in weights, device=_NOWHERE
+        )
         layers += [_filled(linear, weights, f"{name}."), between()]
     return nn.Sequential(*(layers if ends else layers[:-1]))
 
@@ -114,7 +115,9 @@ def convolutions(weights: Weights, names: Sequence[str], strides: Sequence[int])
     layers: list[nn.Module] = []
     for name, kernel, stride in zip(names, kernels, strides, strict=True):
         out, into, height, width = kernel.shape
-        convolution = _blank(nn.Conv2d, into, out, (height, width), stride)
+        biased = f"{name}.bias" in weights
+        size = (height, width)
+        convolution = nn.Conv2d(into, out, size, stride, bias=biased, device=_NOWHERE)
         layers += [_filled(convolution, weights, f"{name}."), nn.ReLU()]
     return nn.Sequential(*layers, nn.Flatten())
 
@@ -130,7 +133,7 @@ def lstm(weights: Weights, prefix: str) -> nn.LSTM:
     if gates is None or gates.ndim != 2 or len(gates) < 4:
         raise InputError(f"The weights '{prefix}weight_ih_l0' are no LSTM's.", _AGAIN)
     filled: nn.LSTM = _filled(
-        _blank(nn.LSTM, gates.shape[1], len(gates) // 4, count), weights, prefix
+        nn.LSTM(gates.shape[1], len(gates) // 4, count, device=_NOWHERE), weights, prefix
     )
     return filled
 
@@ -234,6 +237,7 @@ def _weight(weights: Weights, name: str) -> npt.NDArray[Any]:
 
 def _filled(layer: Any, weights: Weights, prefix: str) -> Any:
     """Returns a layer with its weights in it, to be asked and not to be trained."""
+    layer = layer.to_empty(device="cpu")
     for name, parameter in layer.named_parameters():
         weight = weights.get(f"{prefix}{name}")
         if weight is None or weight.shape != tuple(parameter.shape):

@@ -1,8 +1,11 @@
 """The adapters: whose agents can be read, from files and from memory."""
 
 from importlib import import_module
+from math import prod
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from trdlab.errors import InputError
 from trdlab.policies.adapted import Drawing, Valuing
@@ -15,6 +18,8 @@ _FILES = ("stable_baselines3", "cleanrl", "linear")
 
 _OBJECTS = ("live",)
 """Likewise with an `adapt(object)`."""
+
+_LARGEST = 10_000_000  # numbers in an observation
 
 
 def read_policy(path: Path, options: Options) -> Policy:
@@ -54,6 +59,18 @@ def _adapter(name: str) -> Any:
 
 
 def _acting(found: Drawing | Valuing, options: Options, path: Path) -> Policy:
+    """Returns an agent as it should act, once it has acted."""
+    seen = found.about.seen or ()
+    try:
+        if prod(seen) > _LARGEST:
+            raise RuntimeError(f"it sees {prod(seen):,} numbers")  # noqa: TRY301
+        found.act(np.zeros((1, *seen), dtype=np.float32), None, np.ones(1, dtype=np.bool_))
+    except RuntimeError as error:  # how PyTorch says that layers do not follow each other
+        reason = str(error).splitlines()[0]
+        raise InputError(
+            f"The network in '{path}' cannot be shown what it says to see, {seen}: {reason}.",
+            "Save the agent again.",
+        ) from error
     if options.greedy is False and isinstance(found, Valuing):
         raise InputError(
             f"'{path}' holds the values of actions, and no probabilities to draw from.",

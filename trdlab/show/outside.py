@@ -25,7 +25,7 @@ def agent_page(agent: Agent, how: str, *, width: int | None = None) -> Text:
         ("agent", about.title if about else agent.name),
         ("sees", there.seen),
         ("does", there.done),
-        ("network", f"{about.layers} {about.activation}".strip() if about else ""),
+        ("network", ", ".join(filter(None, (about.layers, about.activation))) if about else ""),
         ("memory", f"{about.memory} numbers" if about and about.memory else ""),
         ("gamma", f"{about.gamma:g}" if about and about.gamma is not None else ""),
         ("acts", _ACTS[how]),

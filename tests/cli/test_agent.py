@@ -105,8 +105,8 @@ def test_who_asks_what_it_expects_is_told_to_fit_it(trdlab, tmp_path, command):
     ("words", "message"),
     [
         (("mine.zip",),
-         "Nothing says where 'mine.zip' acts: it is a PPO of Stable-Baselines3 2.3.0. Give its --env: "
-         "it needs observations of shape (4,) and 2 actions."),
+         "Nothing says where 'mine.zip' acts: it is a PPO of Stable-Baselines3 2.3.0. Give its "
+         "--env: it needs observations of shape (4,) and 2 actions."),
         (("mine.zip", "--env", "Acrobot-v1"),
          "'Acrobot-v1' does not fit 'mine': it has 6 float32 to see and 3 actions. This PPO needs "
          "observations of shape (4,) and 2 actions."),

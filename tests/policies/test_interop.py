@@ -151,7 +151,7 @@ def test_every_algorithm_acts_as_its_library_says(model, live, tmp_path):
     assert (policy.about.memory > 0) == (name == "RecurrentPPO") == (mine is not None)
 
 
-def test_a_loaded_model_plays_with_what_its_environment_normalises():
+def test_what_the_environment_normalises_is_normalised(tmp_path):
     from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
     inside = VecNormalize(DummyVecEnv([lambda: gym.make("CartPole-v1")]))
@@ -165,6 +165,10 @@ def test_a_loaded_model_plays_with_what_its_environment_normalises():
         told = model.policy.get_distribution(tensor).distribution.probs.numpy()
     np.testing.assert_allclose(likely, told, rtol=1e-5)
     assert agent.evaluate(3, seed=0).returns.min() > 5
+    model.save(tmp_path / "a")
+    inside.save(tmp_path / "a.pkl")
+    read = trdlab.agent(f"{tmp_path}/a.zip,normalize={tmp_path}/a.pkl", env="CartPole-v1")
+    np.testing.assert_allclose(ask(read.policy, seen)[0], told, rtol=1e-5)
     assert repr(agent) == "<Agent: PPO · not fitted · action 0, action 1>"
 
 

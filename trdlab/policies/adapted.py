@@ -1,9 +1,9 @@
 """What all agents of other libraries become here: a policy, and what is known about it."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import prod
-from typing import Any
+from typing import Any, Self
 
 import gymnasium as gym
 import numpy as np
@@ -93,6 +93,10 @@ class Valuing:
     about: About
     values: Callable[[Any], FloatArray]
 
+    def seeing(self, change: Callable[[Any], Any]) -> Self:
+        """Returns the same, that sees observations changed."""
+        return replace(self, values=lambda observations: self.values(change(observations)))
+
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns 1 for that action `[B, A]`; there is nothing to remember."""
         return greedy(self.q_values(observations)), None
@@ -129,6 +133,11 @@ class Drawing:
 
     about: About
     scores: Scores
+
+    def seeing(self, change: Callable[[Any], Any]) -> Self:
+        """Returns the same, that sees observations changed."""
+        own = self.scores
+        return replace(self, scores=lambda seen, state, begins: own(change(seen), state, begins))
 
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns the probabilities `[B, A]`, and what to remember."""

@@ -30,10 +30,12 @@ class Options:
         activation: between the layers; by default what the file says, or the algorithm's own.
         greedy: whether to take the likeliest action rather than draw one; by default as the
             algorithm does, and the best of what plain layers say.
+        normalize: a file that `VecNormalize.save` wrote, where the agent was trained with that.
     """
 
     activation: str | None = None
     greedy: bool | None = None
+    normalize: str | None = None
 
     @classmethod
     def of(cls, arguments: Mapping[str, Any]) -> "Options":
@@ -52,6 +54,7 @@ class Options:
         for value, kind, cure in (
             (options.greedy, bool, "It must be true or false."),
             (options.activation, str, "Give the name of one, such as tanh."),
+            (options.normalize, str, "Name a file."),
         ):
             if value is not None and not isinstance(value, kind):
                 raise InputError(f"An agent's file was given the argument '{value}'.", cure)

@@ -10,6 +10,7 @@ import numpy as np
 from trdlab.errors import InputError
 from trdlab.policies.adapted import Drawing, Valuing
 from trdlab.policies.files import Options, open_agent
+from trdlab.policies.normalisation import read_normalisation
 from trdlab.policies.protocol import Policy
 from trdlab.policies.ready import Likeliest
 
@@ -76,4 +77,7 @@ def _acting(found: Drawing | Valuing, options: Options, path: Path) -> Policy:
             f"'{path}' holds the values of actions, and no probabilities to draw from.",
             "Leave out greedy.",
         )
+    if options.normalize is not None:
+        change = read_normalisation(Path(options.normalize), found.about.seen)
+        found = found if change is None else found.seeing(change)
     return Likeliest(found) if options.greedy and isinstance(found, Drawing) else found

@@ -8,6 +8,7 @@ import torch
 from safetensors.torch import save_file
 from torch.nn import functional
 
+import trdlab
 from archives import drawn, layers, tensors
 from trdlab.errors import InputError
 from trdlab.policies import ask
@@ -131,3 +132,17 @@ def test_texts_are_no_weights_and_weights_no_texts(tmp_path):
     assert not is_text(path)
     with pytest.raises(InputError, match=r"is no file of weights|holds no weights"):
         read(path)
+
+
+def test_an_agent_of_games_plays_them(tmp_path):
+    save(tmp_path / "a.cleanrl_model", DQN | {"network.9.weight": (4, 5), "network.9.bias": (4,)})
+    agent = trdlab.agent(tmp_path / "a.cleanrl_model", env="ALE/Breakout-v5")
+    assert agent.action_names == ("NOOP", "FIRE", "RIGHT", "LEFT")
+    assert agent.evaluate(2, max_steps=12).lengths.tolist() == [12, 12]
+    assert (
+        trdlab.agent(agent, env="Breakout", env_arguments={"sticky": 0.25}).policy is agent.policy
+    )
+    with pytest.raises(InputError, match=r"it has 4×84×84 uint8 to see and 6 actions \(NOOP"):
+        trdlab.agent(tmp_path / "a.cleanrl_model", env="Pong")
+    with pytest.raises(InputError, match=r"observations of shape \(4, 84, 84\) and 4 actions"):
+        trdlab.agent(tmp_path / "a.cleanrl_model", env="CartPole-v1")

@@ -147,6 +147,7 @@ def test_every_algorithm_acts_as_its_library_says(model, live, tmp_path):
         3,
     )
     assert policy.about.gamma == 0.99
+    assert policy.about.layers.endswith(" → 15" if name == "QR-DQN" else " → 3")
     assert policy.about.version
     assert (policy.about.memory > 0) == (name == "RecurrentPPO") == (mine is not None)
 

@@ -70,6 +70,10 @@ def test_dqn_takes_the_best_of_its_values(tmp_path):
     )
     assert (about.layers, about.activation, about.gamma) == ("4 → 5 → 2", "ReLU", 0.9)
     assert isinstance(policy, Policy)
+    with pytest.raises(InputError, match=r"values at observation 1 of 2 are no numbers: \[nan"):
+        ask(policy, np.float32([[0, 0, 0, 0], [0, 0, np.nan, 0]]))
+    with pytest.raises(InputError, match=r"shown observations of shape \(3,\)\. It takes \(4,\)"):
+        ask(policy, np.zeros((2, 3)))
 
 
 def test_ppo_draws_and_its_activation_is_said_or_given(tmp_path):

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from trdlab.agents.agent import Agent
-from trdlab.agents.models import is_model
 from trdlab.agents.places import AXIS, Place, Where, find_place
 from trdlab.environments.arguments import parse_name
 from trdlab.environments.interface import Interface
@@ -44,7 +43,7 @@ def file_agent(name: str, *, env: Where | None, env_arguments: Sequence[str] = (
             f"Nothing says where '{file}' acts: it is a {about.title}.",
             f"Give its `env`: it needs {about.needs}.",
         )
-    place = _find_place(env, env_arguments)
+    place = find_place(env, env_arguments, AXIS)
     agent = policy_agent(policy, place, path.stem)
     return replace(agent, origin=place.origin(name, None, away=True))
 
@@ -84,22 +83,3 @@ def policy_agent(who: Policy | Callable[[Any], Any], place: Place, name: str) ->
         policy=policy,
         seconds_per_step=found.seconds_per_step,
     )
-
-
-def _find_place(env: Where, env_arguments: Sequence[str]) -> Place:
-    """Returns where an agent acts; a word that names an Atari game is one."""
-    place = find_place(env, env_arguments, AXIS)
-    if not isinstance(env, str) or is_model(env):
-        return place
-    from trdlab.atari.names import find_game
-
-    try:
-        game = find_game(env)
-    except InputError:
-        return place
-    from trdlab.deep.settings import TrainSettings
-    from trdlab.training.setup import make_environments
-
-    there = TrainSettings("atari", game, env_arg=tuple(env_arguments))
-    make = lambda num, seed: make_environments(there, num_envs=num, seed=seed)  # noqa: E731
-    return replace(place, make=make)

@@ -48,7 +48,8 @@ def adapt(model: Any) -> Drawing | Valuing | None:
         str(getattr(import_module(library), "__version__", "")),
         (int(size),) if size else tuple(shape),
         int(actions.n),
-        layers="" if values is None else sizes(getattr(policy, values)),
+        layers=_layers(policy, values),
+        activation=getattr(getattr(policy, "activation_fn", None), "__name__", ""),
         memory=2 * memory.num_layers * memory.hidden_size if memory else 0,
         gamma=float(model.gamma),
         draws=values is None,
@@ -57,6 +58,20 @@ def adapt(model: Any) -> Drawing | Valuing | None:
     if values is None:
         return Drawing(about, asked.remembering if memory else asked.logits)
     return Valuing(about, asked.quantiles if values == "quantile_net" else asked.values)
+
+
+def _layers(policy: Any, values: str | None) -> str:
+    """Returns the sizes of what acts; the names of its parts are those of the library."""
+    if values is not None:
+        return sizes(getattr(policy, values))
+    extractor = getattr(policy, "mlp_extractor", None)
+    parts = (
+        getattr(policy, "pi_features_extractor", None),
+        getattr(policy, "lstm_actor", None),
+        getattr(extractor, "policy_net", None),
+        getattr(policy, "action_net", None),
+    )
+    return sizes(*filter(None, parts))
 
 
 class _Asked:

@@ -41,9 +41,12 @@ def agent(
         what: a run's folder, or `RUN@STEP` for an older checkpoint; `gridworld:drone`, a map file
             or `tabular:FrozenLake-v1`, for the exact table of a model; a gridworld or another
             model; a table that is solved already; any `Estimator`, such as one of your own; or an
-            agent.
+            agent. Of others, who know nothing of their future until they are fitted: a file of
+            Stable-Baselines3 or CleanRL, a loaded model, a `Policy`, or a function from an
+            observation to an action's number, or from observations to probabilities.
         env: where it acts, if that is not where it was made for: a Gymnasium id, an environment, a
-            function that makes one, or a model or its name. An estimator of your own needs it.
+            function that makes one, or a model or its name. An estimator of your own needs it, and
+            so does an agent of others; that can also act in an Atari game.
         env_arguments: what to make the environment of an id with.
         gamma: γ of a model's table, by default 0.95. Whatever else has its own, as it has N and w.
         horizon: N of a model's table, by default 4.

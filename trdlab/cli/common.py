@@ -39,7 +39,8 @@ Plot = Annotated[Path | None, typer.Option("--plot", help="Write a picture: .png
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")]
 AGENT = (
     "A run's folder, or RUN@STEP for an older checkpoint; or an exact table: gridworld:NAME, a map "
-    "file, or tabular:ENV_ID, with arguments after commas, such as gridworld:ledge,slip=0.2."
+    "file, or tabular:ENV_ID, with arguments after commas, such as gridworld:ledge,slip=0.2; or an "
+    "agent of another library, as trdlab agent reads it."
 )
 EnvArguments = Annotated[
     list[str] | None,

@@ -84,7 +84,7 @@ def agent(
     else:
         made = agent_of(what, env, words, changed(AXIS, *axis))
     if policy is not None:
-        made = replace(made, policy=acting(policy))
+        made = replace(made, policy=acting(policy), origin=None)  # its name is not of this one
     if action_names is not None and len(action_names) != len(made.action_names):
         raise InputError(
             f"There are {len(action_names)} names for {len(made.action_names)} actions.",
@@ -195,6 +195,8 @@ def fit(
     steps: int = 100_000,
     share: float = 0.1,
     seed: int = 1,
+    seconds: float | None = None,
+    out: str | Path | None = None,
     tell: "Callable[[int | FitProgress], None]" = lambda progress: None,
     **settings: Any,
 ) -> "Agent":
@@ -212,22 +214,32 @@ def fit(
         steps: how many it plays, at least.
         share: the chance that an action is forced.
         seed: of everything.
+        seconds: after which learning stops, if not before; then the seed is not all it depends on.
+        out: a new folder to keep it in, which names the agent from then on.
         tell: told of steps that were taken, and then of each look at the held-out error.
         settings: else, as of `FitSettings`: `method`, `hidden`, `learning_rate`, …
 
     Raises:
         InputError: this is no agent, or a setting cannot be used.
+        OutputError: the folder exists, or cannot be written.
     """
+    from dataclasses import asdict
+
     from trdlab.deep.experience import gather
     from trdlab.deep.fit import Fit, FitSettings
-    from trdlab.estimator import Future
+    from trdlab.estimator import Future, Unfitted
     from trdlab.policies import acting
     from trdlab.rollouts.playing import usual_limit
     from trdlab.time_axis import TimeAxis
+    from trdlab.training.fitted import Whose, check_free_for_fit, save_fit
 
+    if out is not None:
+        check_free_for_fit(Path(out))
     frozen, chosen = _agent(agent, env), FitSettings(**{"seed": seed} | settings)
     policy = acting(frozen.policy or frozen.estimator)
-    own = getattr(policy, "gamma", None) or frozen.estimator.time_axis.gamma
+    own = getattr(getattr(policy, "about", None), "gamma", None)
+    if own is None:
+        own = 0.99 if isinstance(frozen.estimator, Unfitted) else frozen.estimator.time_axis.gamma
     axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)
     experience = gather(
         frozen.make,
@@ -241,9 +253,17 @@ def fit(
         seed=seed,
         tell=tell,
     )
-    fitted = Fit(experience, frozen.interface.space, axis, chosen)
-    fitted.run(tell)
-    return replace(frozen, estimator=fitted.estimator(future), policy=policy)
+    fitting = Fit(experience, frozen.interface.space, axis, chosen)
+    fitting.run(tell, seconds)
+    fitted = replace(frozen, estimator=fitting.estimator(future), policy=policy)
+    if out is not None:
+        of = frozen.origin
+        at = (of.env, of.env_arguments) if of and of.away else ()
+        whose = None if of is None else Whose(of.name, *at)
+        how = {"steps": steps, "share": share, "updates": fitting.num_updates, **asdict(chosen)}
+        save_fit(Path(out), fitting.estimator(future), frozen.interface, whose, how)
+        fitted = replace(fitted, name=Path(out).name)
+    return fitted
 
 
 def calibrate(

@@ -12,9 +12,11 @@ from trdlab.agents.outside import file_agent
 from trdlab.agents.places import AXIS, Origin, Where, changed
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
+from trdlab.policies import acting
 from trdlab.policies.functions import PYTHON, from_python
 from trdlab.tabular.toytext import toy_text_ids
 from trdlab.time_axis import TimeAxis
+from trdlab.training.fitted import is_fit, load_fit
 
 _OWN_AXIS = "is a run with its own γ, N and w."
 _UNKNOWN_AXIS = "gets γ, N and w when it is fitted."
@@ -63,10 +65,29 @@ def find_agent(
         raise InputError(f"'{name}' {own}", _LEAVE_OUT)
     if is_file:
         return file_agent(name, **where)
+    if is_fit(Path(name)):
+        return _fitted(name, env, env_arguments)
     from trdlab.agents.runs import run_agent
 
     path, step = _checkpoint(name)
     return run_agent(path, step=step, **where)
+
+
+def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
+    """Returns the agent of a fit, in a folder: who was fitted, with what was learned of it."""
+    estimator, interface, whose = load_fit(Path(name))
+    if whose is None:
+        raise InputError(
+            f"'{name}' was fitted to an agent without a name.",
+            "Give it in Python: trdlab.agent(trdlab.load(folder), env=…, policy=…).",
+        )
+    if env is None:
+        env, env_arguments = whose.env, whose.env_arguments
+    of = find_agent(whose.agent, env=env, env_arguments=env_arguments)
+    interface.check_fits(of.interface, str(env or whose.agent))
+    policy = acting(of.policy or of.estimator)
+    origin = of.origin and replace(of.origin, name=name, time_axis=None)
+    return replace(of, name=Path(name).name, estimator=estimator, policy=policy, origin=origin)
 
 
 def _made(name: str, env: Where | None, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:

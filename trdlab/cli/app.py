@@ -15,6 +15,7 @@ COMMANDS = {
     "explain": "trdlab.cli.explain",
     "compare": "trdlab.cli.compare",
     "agent": "trdlab.cli.agent",
+    "fit": "trdlab.cli.fit",
     "train": "trdlab.cli.train",
     "resume": "trdlab.cli.train",
     "evaluate": "trdlab.cli.train",

@@ -5,6 +5,7 @@ compounds, and far components are learned as near ones are. What is not known of
 episode was cut off, or another action was forced meanwhile, is expected by the network itself.
 """
 
+import time
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ Method = Literal["mixed", "regression", "td"]
 _LEAST_SCALE = 1e-6  # of the largest: a component that hardly pays is not blown up to its size
 _FALLS = 5  # times that the learning rate falls before learning stops
 _FALL = 0.3  # what is left of it each time
+_NOTHING = 1e-3  # of what came: where it varies by less, there is nothing to predict
 _LAG = 1e-2  # of what is expected: so much the target network may lag behind before it counts
 
 
@@ -142,13 +144,23 @@ class Fit:
         self._known = self._held_out()
         self._settled = self._syncs() * self.settings.sync_every
 
-    def run(self, tell: Callable[[FitProgress], None] = lambda progress: None) -> FitProgress:
+    def run(
+        self,
+        tell: Callable[[FitProgress], None] = lambda progress: None,
+        seconds: float | None = None,
+    ) -> FitProgress:
         """Learns until held-out error stops falling, and keeps the best network.
 
         What is expected of what is not known has to settle first, and is no part of that error.
+
+        Args:
+            tell: told how far it is, now and then.
+            seconds: after which it stops, if not before.
         """
+        until = np.inf if seconds is None else time.monotonic() + seconds
         best, kept, waited, falls = np.inf, deepcopy(self.network.state_dict()), 0, 0
-        while self.num_updates < self.settings.most_updates and falls <= _FALLS:
+        most = self.settings.most_updates
+        while self.num_updates < most and falls <= _FALLS and time.monotonic() < until:
             for _ in range(self.settings.check_every):
                 self.update()
             error = self.error()
@@ -195,7 +207,9 @@ class Fit:
             ]
         apart = np.where(known, np.concatenate(parts) * self.scale - came, 0.0)
         size = np.where(known, came - constant, 0.0)
-        return float((apart**2 / self.scale**2).sum() / max((size**2 / self.scale**2).sum(), 1e-30))
+        least = _NOTHING * (np.where(known, came, 0.0) ** 2 / self.scale**2).sum()
+        constants = max((size**2 / self.scale**2).sum(), least, 1e-30)
+        return float((apart**2 / self.scale**2).sum() / constants)
 
     def estimator(self, future: Future) -> NetworkEstimator:
         """Returns the network as an Estimator, its outputs in discounted reward."""

@@ -14,6 +14,7 @@ from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
 from trdlab.rollouts.playing import Watch, part_of, unwatched, usual_limit
 from trdlab.runs import RunFolder, read_arrays
+from trdlab.training.fitted import is_fit, load_fit
 from trdlab.training.machine import use_threads
 from trdlab.training.setup import future, make_environments
 
@@ -31,13 +32,15 @@ def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
     the components of every action.
 
     Args:
-        path: the run's folder.
+        path: the run's folder, or that of a fit.
         step: of an older checkpoint, in agent steps; by default the newest.
 
     Raises:
         InputError: there is no run, or no such checkpoint.
         TrdlabError: something is torn.
     """
+    if step is None and is_fit(Path(path)):
+        return load_fit(Path(path))[0]
     return _loaded(RunFolder.open(Path(path)), step)[1]
 
 

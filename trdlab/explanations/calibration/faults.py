@@ -15,7 +15,7 @@ from trdlab.statistics import FEWEST_EPISODES
 EXPLAINED = 0.95
 """The share of what is wrong between components that a fault must account for, to be named."""
 
-_ROUNDING = 1e-9  # relative to the largest component
+_ROUNDING = 1e-6  # relative to the largest component; networks have seven digits
 
 
 def _forms(report: CalibrationReport) -> dict[str, Form]:

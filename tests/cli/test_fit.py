@@ -1,0 +1,111 @@
+"""`trdlab fit` and what it keeps, as users meet them."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trdlab
+from trdlab.cli import main
+from trdlab.errors import InputError, OutputError, TrdlabError
+from trdlab.policies import EpsilonGreedy
+from trdlab.training.fitted import load_fit
+
+QUICK = {"horizon": 3, "steps": 4_000, "most_updates": 400, "learning_rate": 0.01}
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("fits") / "ledge"
+    trdlab.fit("gridworld:ledge", out=path, **QUICK)  # type: ignore[arg-type]
+    return path
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as caught:
+        main([str(word) for word in words])
+    told = capsys.readouterr()
+    return int(caught.value.code or 0), told.out, told.err
+
+
+def test_a_fit_says_how_far_it_can_be_trusted_and_where_it_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ("fit", "gridworld:ledge", "--N", 3, "--steps", 4_000, "--time", "1s")
+    code, out, err = run(capsys, *words)
+    assert code == 0
+    assert re.match(r"Over 300 episodes the agent scored 0\.8", out)
+    assert "the agent's forecasts" in out
+    assert out.rstrip().endswith("Try: trdlab explain fits/ledge-N3-w1")
+    assert "Kept: fits/ledge-N3-w1" in err
+    code, page, _ = run(capsys, "explain", "fits/ledge-N3-w1", "--what", "forecast")
+    assert code == 0
+    assert "After the first action, the agent's own policy acts." in page
+    code, _, err = run(capsys, *words, "--out", "fits/ledge-N3-w1")
+    assert (code, err) == (2, "error: 'fits/ledge-N3-w1' exists. Choose another --out.\n")
+
+
+@pytest.mark.parametrize("text", ["soon", "0", "10 days"])
+def test_a_time_is_written_as_people_do(text: str, capsys: pytest.CaptureFixture[str]):
+    code, _, err = run(capsys, "fit", "gridworld:ledge", "--time", text)
+    assert (code, err) == (2, f"error: The time is '{text}'. Write it as 90s, 10m or 1h.\n")
+
+
+def test_what_is_kept_is_what_was_fitted(kept: Path):
+    fitted = trdlab.fit("gridworld:ledge", **QUICK)  # type: ignore[arg-type]
+    estimator, interface, whose = load_fit(kept)
+    states = np.arange(6)
+    told = fitted.estimator.decompose(states).components
+    assert estimator.decompose(states).components.tobytes() == told.tobytes()
+    assert estimator.future == fitted.estimator.future
+    assert interface.action_names == fitted.action_names
+    assert whose is not None
+    assert (whose.agent, whose.env) == ("gridworld:ledge", None)
+    again = trdlab.agent(str(kept))
+    assert (again.name, again.estimator.time_axis) == ("ledge", trdlab.TimeAxis(0.95, 3))
+    assert trdlab.load(kept).decompose(states).components.tobytes() == told.tobytes()
+
+
+def test_an_agent_without_a_name_is_kept_and_named_in_python(tmp_path):
+    agent = trdlab.solve("ledge", horizon=2)
+    unnamed = trdlab.agent(agent.estimator, env="gridworld:ledge", name="mine")
+    trdlab.fit(unnamed, out=tmp_path / "mine", **QUICK)  # type: ignore[arg-type]
+    assert trdlab.load(tmp_path / "mine").time_axis.horizon == 3
+    with pytest.raises(InputError, match=r"an agent without a name\. Give it in Python"):
+        trdlab.agent(str(tmp_path / "mine"))
+
+
+def test_another_policy_is_another_agent_and_has_not_its_name(tmp_path):
+    agent = trdlab.agent("gridworld:ledge", horizon=2)
+    stumbling = trdlab.agent(agent, policy=EpsilonGreedy(agent.policy, 0.3))
+    trdlab.fit(stumbling, out=tmp_path / "fit", **QUICK)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="an agent without a name"):
+        trdlab.agent(str(tmp_path / "fit"))
+
+
+def test_nothing_is_replaced_and_what_is_torn_is_named(kept: Path, tmp_path):
+    with pytest.raises(OutputError, match=r"exists\. Choose another `out`\."):
+        trdlab.fit("gridworld:ledge", out=kept, **QUICK)  # type: ignore[arg-type]
+    torn = tmp_path / "torn"
+    torn.mkdir()
+    data = json.loads((kept / "fit.json").read_text())
+    (torn / "fit.json").write_text(json.dumps({**data, "hidden": [7]}))
+    (torn / "weights.safetensors").write_bytes((kept / "weights.safetensors").read_bytes())
+    with pytest.raises(TrdlabError, match=r"torn' is torn: The weights are of another network"):
+        trdlab.load(torn)
+    (torn / "fit.json").write_text('{"schema": "trdlab.fit/1"}')
+    with pytest.raises(TrdlabError, match="does not say what was fitted: it is torn"):
+        trdlab.agent(str(torn))
+
+
+def test_who_knows_nothing_yet_is_told_how_to_find_out(tmp_path):
+    def policy(observations: np.ndarray) -> np.ndarray:
+        return np.tile([0.5, 0.5], (len(observations), 1))
+
+    agent = trdlab.agent(policy, env="CartPole-v1")
+    with pytest.raises(InputError, match=r"Fit it first: trdlab\.fit\(agent\), or trdlab fit\."):
+        trdlab.explain(agent)
+    fitted = trdlab.fit(agent, horizon=4, steps=2_000, most_updates=200)
+    assert fitted.estimator.time_axis == trdlab.TimeAxis(0.99, 4)
+    assert "the agent's own policy" in str(trdlab.explain(fitted, parts="forecast", episodes=10))

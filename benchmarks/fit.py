@@ -1,7 +1,8 @@
 """Fits against exact answers: how far off is each method, for actions never taken, too?
 
 A random policy of each world is frozen, a fifth of its actions is forced, and every component of
-every state and action is compared with the exact evaluation of that policy. Episodes begin anywhere.
+every state and action is compared with the exact evaluation of that policy. Episodes begin
+anywhere.
 
     python benchmarks/fit.py                      # three worlds, three methods, five seeds
     python benchmarks/fit.py --seeds 1 --steps 200000

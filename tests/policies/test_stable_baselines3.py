@@ -96,6 +96,7 @@ def test_ppo_draws_and_its_activation_is_said_or_given(tmp_path):
     likeliest = read(path, greedy=True)
     assert ask(likeliest, SEEN)[0].tolist() == np.eye(2)[told(relu).argmax(axis=1)].tolist()
     assert likeliest.about.draws is False
+    assert (plain.gamma, likeliest.gamma) == (0.9, 0.9)
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from archives import (
     layers,
     ppo_shapes,
     save_archive,
+    tensors,
     torch_bytes,
 )
 from trdlab.errors import InputError
@@ -95,6 +96,7 @@ def test_ppo_draws_and_its_activation_is_said_or_given(tmp_path):
     likeliest = read(path, greedy=True)
     assert ask(likeliest, SEEN)[0].tolist() == np.eye(2)[told(relu).argmax(axis=1)].tolist()
     assert likeliest.about.draws is False
+    assert (plain.gamma, likeliest.gamma) == (0.9, 0.9)
 
 
 @pytest.mark.parametrize(
@@ -258,13 +260,21 @@ def test_weights_that_do_not_fit_are_named(tmp_path, name, how):
     ("beside", "message"),
     [
         (data("stable_baselines3.sac.policies", box(4)), "weights|SAC"),
-        (data("mine.policies", box(4)), "a class of its own, in the module 'mine.policies'"),
+        (data("mine.policies", box(4)), "a class of its own, in the module 'mine'"),
         (data(COMMON, {":type:": "<class 'gymnasium.spaces.dict.Dict'>"}), "sees a Dict"),
         (data(COMMON, box(4)) | {"action_space": box(2)}, "are a Box. A decomposition has one row"),
         (data(COMMON, box(4), actions=3), "has 2 outputs for 3 actions"),
         (
             data(COMMON, box(4), policy_kwargs={"activation_fn": "<class 'mine.Wave'>"}),
             "There is no activation 'Wave'",
+        ),
+        (
+            data(
+                COMMON,
+                box(4),
+                policy_kwargs={"features_extractor_class": "<class 'mine.f.<locals>.CNN'>"},
+            ),
+            "The extractor in .* is of a class of its own, in the module 'mine'",
         ),
         ([], "holds no names"),
     ],
@@ -285,6 +295,10 @@ def test_a_network_of_ones_own_is_refused_by_what_is_strange(tmp_path):
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("data", json.dumps({}))
     with pytest.raises(InputError, match=r"without its policy\.pth"):
+        read(path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("policy.pth", torch_bytes(tensors(drawn(ppo_shapes()))))
+    with pytest.raises(InputError, match=r"without its data\. Save the model again"):
         read(path)
     with pytest.raises(InputError, match=r"no argument 'activations'. Did you mean 'activation'"):
         read(path, activations="tanh")

@@ -116,7 +116,9 @@ def test_a_torn_file_is_refused_wherever_it_ends(tmp_path):
 
 
 def test_what_holds_no_weights_is_refused(tmp_path):
-    for number, held in enumerate([{}, [], 3, {"a": 1}, {"state_dict": 1}, torch.zeros(2)]):
+    for number, held in enumerate(
+        [{}, [], 3, {"a": 1}, {"\x1b[2J": torch.zeros(2)}, {"state_dict": 1}, torch.zeros(2)]
+    ):
         torch.save(held, tmp_path / f"{number}.pt")
         with pytest.raises(InputError, match=r"holds no weights by name\. Give a state dict"):
             read_weights(tmp_path / f"{number}.pt")

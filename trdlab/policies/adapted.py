@@ -93,6 +93,11 @@ class Valuing:
     about: About
     values: Callable[[Any], FloatArray]
 
+    @property
+    def gamma(self) -> float | None:
+        """γ that it was trained with, if that is said."""
+        return self.about.gamma
+
     def seeing(self, change: Callable[[Any], Any]) -> Self:
         """Returns the same, that sees observations changed."""
         return replace(self, values=lambda observations: self.values(change(observations)))
@@ -133,6 +138,11 @@ class Drawing:
 
     about: About
     scores: Scores
+
+    @property
+    def gamma(self) -> float | None:
+        """γ that it was trained with, if that is said."""
+        return self.about.gamma
 
     def seeing(self, change: Callable[[Any], Any]) -> Self:
         """Returns the same, that sees observations changed."""

@@ -1,10 +1,11 @@
 """Files of agents: what they hold, as tensors and plain data, whoever has written them."""
 
 import json
+import re
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
 
     Adapter = Callable[["AgentFile", "Options"], Drawing | Valuing | None]
 
-_MOST = 4_000_000_000  # bytes of weights; what says to be larger is no agent
+_AGAIN = "Save the model again: model.save(…)."
+_VERSION = "_stable_baselines3_version"
+_MOST = 1_000_000_000  # bytes of weights; what says to be larger is no agent
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,14 @@ class AgentFile:
     Args:
         path: where it is.
         weights: by name.
-        data: what stands beside them in an archive of Stable-Baselines3, as plain data; empty else.
+        data: what stands beside them in an archive of Stable-Baselines3, as plain data; None where
+            it is none.
         version: of the library that wrote such an archive.
     """
 
     path: Path
     weights: Mapping[str, npt.NDArray[Any]]
-    data: Mapping[str, Any] = field(default_factory=dict)
+    data: Mapping[str, Any] | None = None
     version: str = ""
 
 
@@ -106,27 +110,27 @@ def open_agent(path: Path) -> AgentFile:
     """
     from trdlab.policies.weights import read_part, read_weights
 
-    parts = _parts(path)
-    if "policy.pth" not in parts:
-        if {"data", "pytorch_variables.pth"} & parts.keys():
-            raise InputError(
-                f"'{path}' is an archive of Stable-Baselines3 without its policy.pth.",
-                "Save the model again: model.save(…).",
-            )
+    parts, needed = _parts(path), {"data", "policy.pth"}
+    if not needed & parts:
         return AgentFile(path, read_weights(path))
+    if missing := needed - parts:
+        raise InputError(
+            f"'{path}' is an archive of Stable-Baselines3 without its {min(missing)}.", _AGAIN
+        )
     weights = read_part(_read(path, "policy.pth"), f"{path}: policy.pth")
-    version = _read(path, "_stable_baselines3_version") if len(parts) > 1 else b""
-    return AgentFile(path, weights, _data(path), version.decode("ascii", "replace").strip()[:20])
+    said = _read(path, _VERSION) if _VERSION in parts else b""
+    version = re.match(rb"[\w.+-]{0,20}", said.strip())
+    return AgentFile(path, weights, _data(path), version[0].decode() if version else "")
 
 
-def _parts(path: Path) -> dict[str, int]:
-    """Returns the parts of an archive and their sizes; none where the file is no archive."""
+def _parts(path: Path) -> set[str]:
+    """Returns the names of the parts of an archive; none where the file is no archive."""
     try:
         with path.open("rb") as file:
             if file.read(4) != b"PK\x03\x04":
-                return {}
+                return set()
         with zipfile.ZipFile(path) as archive:
-            return {part.filename: part.file_size for part in archive.infolist()}
+            return set(archive.namelist())
     except OSError as error:
         raise InputError(
             f"'{path}' cannot be read: {error.strerror or error}.", "Name another file."
@@ -136,11 +140,9 @@ def _parts(path: Path) -> dict[str, int]:
 
 
 def _read(path: Path, name: str) -> bytes:
-    """Returns a part of an archive; nothing where there is no such part."""
+    """Returns a part of an archive."""
     try:
         with zipfile.ZipFile(path) as archive:
-            if name not in archive.namelist():
-                return b""
             if (size := archive.getinfo(name).file_size) > _MOST:
                 raise InputError(
                     f"'{name}' in '{path}' says to hold {size:,} bytes.", "It is no agent."
@@ -153,11 +155,9 @@ def _read(path: Path, name: str) -> bytes:
 def _data(path: Path) -> dict[str, Any]:
     """Returns the plain data of an archive; what is pickled in it stays the text that it is."""
     try:
-        data = json.loads(_read(path, "data") or b"{}")
+        data = json.loads(_read(path, "data"))
     except (ValueError, RecursionError) as error:
         raise InputError(f"'data' in '{path}' is torn: {error}.", "Copy it again.") from error
     if not isinstance(data, dict):
-        raise InputError(
-            f"'data' in '{path}' holds no names.", "Save the model again: model.save(…)."
-        )
+        raise InputError(f"'data' in '{path}' holds no names.", _AGAIN)
     return data

@@ -100,6 +100,11 @@ class Likeliest:
         about = getattr(self.policy, "about", None)
         return about and replace(about, draws=False)
 
+    @property
+    def gamma(self) -> float | None:
+        """γ that the other one was trained with, if that is said."""
+        return getattr(self.policy, "gamma", None)
+
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns 1 for that action `[B, A]`, and what the other policy remembers."""
         probabilities, state = ask(self.policy, observations, state, begins)

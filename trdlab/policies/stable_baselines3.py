@@ -1,7 +1,8 @@
 """Agents in the archives of Stable-Baselines3 and sb3-contrib; neither has to be installed.
 
 Only tensors and plain JSON are read: what an archive holds as pickles stays unread. Layers and
-their sizes follow from the tensors. The formats are those of versions 1.0 to 2.9.
+their sizes follow from the tensors. The formats are those of versions 1.0 to 2.9. MaskablePPO acts
+without its masks, which are the environment's: it may draw an action that it never could.
 """
 
 import re
@@ -61,9 +62,9 @@ def adapt(file: AgentFile, options: Options) -> Drawing | Valuing | None:
     Raises:
         InputError: the algorithm, or a part of its network, cannot be read.
     """
-    if not file.data:
+    if file.data is None:
         return None
-    saved = _Saved.of(file)
+    saved = _Saved.of(file, file.data)
     return _valuing(saved, options) if saved.values else _drawing(saved, options)
 
 
@@ -76,6 +77,7 @@ class _Saved:
         weights: those that act, by name.
         values: the name of its network of values, if it has one.
         file: the archive.
+        data: what it says of itself.
         kwargs: how its policy was made.
     """
 
@@ -83,45 +85,44 @@ class _Saved:
     weights: Weights
     values: str
     file: AgentFile
+    data: Mapping[str, Any]
     kwargs: Mapping[str, Any]
 
     @classmethod
-    def of(cls, file: AgentFile) -> "_Saved":
+    def of(cls, file: AgentFile, data: Mapping[str, Any]) -> "_Saved":
         weights = {name: of for name, of in file.weights.items() if not _IDLE.match(name)}
         values = next(
             (of for of in ("q_net", "quantile_net") if f"{of}.{of}.0.weight" in weights), ""
         )
-        kwargs = file.data.get("policy_kwargs")
-        saved = cls(
-            _algorithm(file, values),
-            weights,
-            values,
-            file,
-            kwargs if isinstance(kwargs, dict) else {},
-        )
+        said = data.get("policy_kwargs")
+        kwargs = said if isinstance(said, dict) else {}
+        saved = cls(_algorithm(weights, data, values), weights, values, file, data, kwargs)
         saved.check()
         return saved
 
     def check(self) -> None:
         """Refuses a network that is not the library's own."""
         path, known = self.file.path, _VALUES if self.values else _ACTOR
-        module = _module(self.file.data)
-        if module.partition(".")[0] not in ("", "stable_baselines3", "sb3_contrib"):
-            raise InputError(
-                f"The policy in '{path}' is of a class of its own, in the module '{module}'.",
-                _GIVE_MODEL,
-            )
+        made = str(self.kwargs.get("features_extractor_class", ""))
+        homes = {"policy": _module(self.data), "extractor": made.removeprefix("<class '")}
+        for part, home in homes.items():
+            if home and home.partition(".")[0] not in ("stable_baselines3", "sb3_contrib"):
+                raise InputError(
+                    f"The {part} in '{path}' is of a class of its own, in the module "
+                    f"{home.partition('.')[0]!r}.",
+                    _GIVE_MODEL,
+                )
         if self.algorithm not in _KNOWN:
             raise InputError(
                 f"'{path}' holds an agent of {self.algorithm}.",
                 f"Those of {', '.join(_KNOWN)} can be read; give trdlab.agent the loaded model.",
             )
-        if kind := _kind(self.file.data.get("observation_space"), "Dict", "Tuple", "MultiDiscrete"):
+        if kind := _kind(self.data.get("observation_space"), "Dict", "Tuple", "MultiDiscrete"):
             raise InputError(
                 f"The agent in '{path}' sees a {kind} of observations.",
                 "Agents that see a Box or Discrete space can be read.",
             )
-        if kind := _kind(self.file.data.get("action_space"), "Box", "MultiDiscrete", "MultiBinary"):
+        if kind := _kind(self.data.get("action_space"), "Box", "MultiDiscrete", "MultiBinary"):
             raise InputError(
                 f"The actions of the agent in '{path}' are a {kind}.",
                 "A decomposition has one row per action: they must be Discrete.",
@@ -135,14 +136,14 @@ class _Saved:
 
     def about(self, seen: tuple[int, ...], num_actions: int, **more: Any) -> About:
         """Returns what is known."""
-        gamma = self.file.data.get("gamma")
+        gamma = self.data.get("gamma")
         return About(
             self.algorithm,
             LIBRARY,
             self.file.version,
             seen,
             num_actions,
-            gamma=gamma if isinstance(gamma, float | int) else None,
+            gamma=gamma if isinstance(gamma, float | int) and 0.0 <= gamma <= 1.0 else None,
             **more,
         )
 
@@ -155,7 +156,7 @@ class _Saved:
     def features(self, prefix: str) -> tuple[list[nn.Module], tuple[int, ...], float]:
         """Returns what stands before the dense layers, what is seen, and what divides it."""
         names = numbered(self.weights, f"{prefix}cnn.")
-        space = self.file.data.get("observation_space")
+        space = self.data.get("observation_space")
         shape, size = _shape(space), _states(space)
         is_image = (
             len(shape) == 3 and isinstance(space, dict) and "uint8" in str(space.get("dtype"))
@@ -173,7 +174,7 @@ def _valuing(saved: _Saved, options: Options) -> Valuing:
     between, of = saved.activation(options), saved.values
     before, seen, divisor = saved.features(f"{of}.features_extractor.")
     head = dense(saved.weights, numbered(saved.weights, f"{of}.{of}."), between)
-    (_, outputs), actions = flow(head), _actions(saved.file.data)
+    (_, outputs), actions = flow(head), _actions(saved.data)
     quantiles = outputs // actions if of == "quantile_net" and actions else 1
     count = outputs // quantiles
     _check_actions(saved, count)
@@ -248,7 +249,7 @@ def _named(between: type[nn.Module], layers: nn.Sequential) -> str:
 
 def _check_actions(saved: _Saved, count: int) -> None:
     """Refuses a network that has more or fewer outputs than there are actions."""
-    said = _actions(saved.file.data)
+    said = _actions(saved.data)
     if said and said != count:
         raise InputError(
             f"The network in '{saved.file.path}' has {count} outputs for {said} actions.",
@@ -256,9 +257,9 @@ def _check_actions(saved: _Saved, count: int) -> None:
         )
 
 
-def _algorithm(file: AgentFile, values: str) -> str:
+def _algorithm(weights: Weights, data: Mapping[str, Any], values: str) -> str:
     """Returns the algorithm that an archive is of; it does not say so itself."""
-    data, weights, module = file.data, file.weights, _module(file.data)
+    module = _module(data)
     if values:
         return "QR-DQN" if values == "quantile_net" else "DQN"
     if any(name.startswith("lstm_actor.") for name in weights):
@@ -275,7 +276,8 @@ def _algorithm(file: AgentFile, values: str) -> str:
 
 def _module(data: Mapping[str, Any]) -> str:
     kind = data.get("policy_class")
-    return str(kind.get("__module__", "")) if isinstance(kind, dict) else ""
+    said = kind.get("__module__", "") if isinstance(kind, dict) else ""
+    return re.sub(r"[^\w.]", "?", str(said))
 
 
 def _kind(space: Any, *kinds: str) -> str:

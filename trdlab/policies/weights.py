@@ -110,7 +110,8 @@ def _state_dict(held: Any, called: str | Path) -> Mapping[str, Tensor]:
 
 
 def _is_weight(entry: tuple[Any, Any]) -> bool:
-    return isinstance(entry[0], str) and isinstance(entry[1], Tensor)
+    name, weight = entry
+    return isinstance(name, str) and name.isprintable() and isinstance(weight, Tensor)
 
 
 def _array(tensor: Tensor) -> npt.NDArray[Any]:

@@ -34,10 +34,10 @@ def agent(
     """Returns an agent: who acts, where, and what it expects.
 
     Args:
-        what: a run's folder, or `RUN@STEP` for an older checkpoint; `gridworld:drone`, a map file
-            or `tabular:FrozenLake-v1`, for the exact table of a model; a gridworld or another
-            model; a table that is solved already; any `Estimator`, such as one of your own; or an
-            agent.
+        what: a run's folder, `RUN@STEP` or `RUN@best` for another checkpoint; `gridworld:drone`, a
+            map file or `tabular:FrozenLake-v1`, for the exact table of a model; a gridworld or
+            another model; a table that is solved already; any `Estimator`, such as one of your own;
+            or an agent.
         env: where it acts, if that is not where it was made for: a Gymnasium id, an environment, a
             function that makes one, or a model or its name. An estimator of your own needs it.
         env_arguments: what to make the environment of an id with.

@@ -38,8 +38,9 @@ WhoseTies = Annotated[Ties, typer.Option("--ties", help="Whose future, where opt
 Plot = Annotated[Path | None, typer.Option("--plot", help="Write a picture: .png, .pdf or .svg.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")]
 AGENT = (
-    "A run's folder, or RUN@STEP for an older checkpoint; or an exact table: gridworld:NAME, a map "
-    "file, or tabular:ENV_ID, with arguments after commas, such as gridworld:ledge,slip=0.2."
+    "A run's folder, RUN@STEP for an older checkpoint, RUN@best for that of the best score; or an "
+    "exact table: gridworld:NAME, a map file, or tabular:ENV_ID, with arguments after commas, such "
+    "as gridworld:ledge,slip=0.2."
 )
 EnvArguments = Annotated[
     list[str] | None,

@@ -1,6 +1,5 @@
 """The trainer: what it does, remembers, tells and learns when, and that it goes on to the bit."""
 
-import itertools
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -203,44 +202,6 @@ def test_epsilon_is_the_share_of_random_actions():
     assert (taken == 0).mean() == pytest.approx(0.75, abs=0.05)
 
 
-def held(hold: int, *, steps: int = 400, **lines: Any) -> np.ndarray:
-    """Returns `[steps, 100]`, the random actions of a trainer; −1 where it was greedy."""
-    trainer = scripted(*[[(1.0, None)]] * 100, update_every=10**6, epsilon_hold=hold, **lines)
-    draw, drawn = trainer.exploring.draw, []
-
-    def watched(epsilon: float, rng: Any) -> Any:
-        explore, actions = draw(epsilon, rng)
-        drawn.append(np.where(explore, actions, -1))
-        return explore, actions
-
-    trainer.exploring.draw = watched  # type: ignore[method-assign]
-    for _ in range(steps):
-        trainer.step()
-    return np.array(drawn)
-
-
-@pytest.mark.parametrize("hold", [1, 2, 10])
-@pytest.mark.parametrize("epsilon", [0.1, 0.5])
-def test_epsilon_is_the_share_of_random_steps_however_long_one_is_held(hold, epsilon):
-    drawn = held(hold, epsilon_start=epsilon, epsilon_end=epsilon)[50:]
-    assert (drawn >= 0).mean() == pytest.approx(epsilon, abs=0.02)
-
-
-def test_a_random_action_is_held_for_one_to_so_many_steps():
-    drawn = held(4, epsilon_start=0.2, epsilon_end=0.2, learning_starts=1)
-    lengths = {
-        len(run)
-        for env in drawn.T.tolist()
-        for greedy, group in itertools.groupby(env, key=lambda action: action < 0)
-        if not greedy and len(set(run := list(group))) == 1
-    }
-    assert {1, 2, 3, 4} <= lengths
-    always = held(10, steps=200, learning_starts=10**6)  # all steps are random, none is left out
-    assert (always >= 0).all()
-    changes = (np.diff(always, axis=0) != 0).mean()
-    assert changes == pytest.approx(0.5 / 5.5, abs=0.01)  # two actions, 5.5 steps on average
-
-
 def test_nothing_is_held_beyond_the_end_of_an_episode():
     trainer = scripted(STORY, epsilon_hold=1000, learning_starts=10**6)
     for _ in range(12):
@@ -296,6 +257,7 @@ def on_cart_pole(num_envs: int, seed: int = 3) -> Trainer:
         target_sync_updates=7,
         learning_rate_end=1e-5,
         epsilon_steps=400,
+        epsilon_hold=6,
         double=True,
     )
     return Trainer(told, GymEnvironments("CartPole-v1", num_envs, seed=seed))

@@ -10,7 +10,6 @@ done in the folder stays, and a run that was stopped goes on: begin it again whe
 """
 
 import argparse
-from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 
@@ -32,7 +31,7 @@ def main() -> None:
     print("|---|--:|--:|--:|--:|--:|--:|--:|", flush=True)
     for env, horizon, seed in product(options.envs, options.N, options.seeds):
         try:
-            seconds, (result, chance) = trained(options.folder, env, horizon, seed)
+            seconds, result, chance = trained(options.folder, env, horizon, seed)
         except InputError as error:  # such as an environment that is not installed
             print(f"| {env} | {horizon} | {seed} | {error} |", flush=True)
             continue
@@ -42,16 +41,16 @@ def main() -> None:
         print(f"| {' | '.join(cells)} |", flush=True)
 
 
-def trained(folder: Path, env: str, horizon: int, seed: int) -> tuple[float, Iterator[Evaluation]]:
+def trained(
+    folder: Path, env: str, horizon: int, seed: int
+) -> tuple[float, Evaluation, Evaluation]:
     """Trains a run, or goes on with it; returns the seconds, and how it and chance do."""
     settings = preset("gym", env).changed({"N": horizon, "seed": seed})
     path = folder / f"{env}-N{horizon}-seed{seed}"
     with resume(path) if is_run(path) else begin(settings, path) as run:
         carry_on(run)
         seconds = run.seconds
-    return seconds, (
-        evaluate_run(path, episodes=EPISODES, epsilon=epsilon)[0] for epsilon in (0.0, 1.0)
-    )
+    return seconds, *(evaluate_run(path, episodes=EPISODES, epsilon=of)[0] for of in (0.0, 1.0))
 
 
 def _options() -> argparse.Namespace:

@@ -76,7 +76,8 @@ def train_gym(
 ) -> None:
     """Train on a Gymnasium environment.
 
-    Settings come from the preset, then from --config, then from the options.
+    Settings come from the preset, then from --config, then from the options. A task that is known
+    has a preset of its own; the defaults that are shown here are those of classic.
     """
     _train("gym", env_id, preset, config, out, dry_run, given or {})
 

@@ -66,9 +66,9 @@ PRESETS["atari"]["smoke"] = (
     },
 )
 PRESETS["gym"] |= {
-    "acrobot": ("Acrobot", PRESETS["gym"]["classic"][1]),
+    "acrobot": ("for Acrobot, which random play seldom ends", PRESETS["gym"]["classic"][1]),
     "mountain-car": (
-        "MountainCar, whose only reward lies far away",
+        "for MountainCar, which random play never ends",
         PRESETS["gym"]["classic"][1]
         | {
             "agent_steps": 80_000,
@@ -81,7 +81,7 @@ PRESETS["gym"] |= {
         },
     ),
     "lunar-lander": (
-        "LunarLander",
+        "for LunarLander, whose single rewards are large",
         PRESETS["gym"]["classic"][1] | {"loss": "huber", "max_grad_norm": 10.0},
     ),
 }

@@ -65,24 +65,57 @@ PRESETS["atari"]["smoke"] = (
         "log_every": 500,
     },
 )
+_FAR: Config = {
+    "num_envs": 8,
+    "learning_starts": 2_000,
+    "learning_rate_end": 0.0,
+    "batch_size": 64,
+    "hidden": [128, 128],
+    "epsilon_end": 0.05,
+}
+"""What tasks share whose goal random play seldom reaches: they hold a random action, too."""
 PRESETS["gym"] |= {
-    "acrobot": ("for Acrobot, which random play seldom ends", PRESETS["gym"]["classic"][1]),
+    "acrobot": (
+        "for Acrobot, whose goal random play seldom reaches",
+        _FAR
+        | {
+            "epsilon_steps": 20_000,
+            "epsilon_hold": 4,
+            "update_every": 1,
+            "learning_rate": 6.3e-4,
+            "loss": "huber",
+            "max_grad_norm": 10.0,
+        },
+    ),
     "mountain-car": (
-        "for MountainCar, which random play never ends",
-        PRESETS["gym"]["classic"][1]
+        "for MountainCar, whose goal random play never reaches",
+        _FAR
         | {
             "agent_steps": 80_000,
             "gamma": 0.98,
-            "epsilon_end": 0.05,
             "epsilon_steps": 30_000,
             "epsilon_hold": 30,  # a car that is pushed to and fro at random stays where it is
+            "update_every": 2,
             "target_sync_updates": 150,
-            "hidden": [128, 128],
+            "capacity": 50_000,
         },
     ),
     "lunar-lander": (
         "for LunarLander, whose single rewards are large",
-        PRESETS["gym"]["classic"][1] | {"loss": "huber", "max_grad_norm": 10.0},
+        {
+            "agent_steps": 200_000,
+            "num_envs": 8,
+            "learning_starts": 2_000,
+            "epsilon_end": 0.1,  # with less, and without holding, it learns to hover for ever
+            "epsilon_steps": 30_000,
+            "epsilon_hold": 4,
+            "batch_size": 128,
+            "learning_rate_end": 1e-4,
+            "loss": "huber",
+            "max_grad_norm": 10.0,
+            "hidden": [256, 256],
+            "capacity": 200_000,
+        },
     ),
 }
 DEFAULT_PRESETS: dict[Kind, str] = {"gym": "classic", "atari": "paper"}

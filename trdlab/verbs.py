@@ -38,12 +38,13 @@ def agent(
     """Returns an agent: who acts, where, and what it expects.
 
     Args:
-        what: a run's folder, or `RUN@STEP` for an older checkpoint; `gridworld:drone`, a map file
-            or `tabular:FrozenLake-v1`, for the exact table of a model; a gridworld or another
-            model; a table that is solved already; any `Estimator`, such as one of your own; or an
-            agent. Of others, who know nothing of their future until they are fitted: a file of
-            Stable-Baselines3 or CleanRL, a loaded model, a `Policy`, or a function from an
-            observation to an action's number, or from observations to probabilities.
+        what: a run's folder, `RUN@STEP` or `RUN@best` for another checkpoint; that of a fit;
+            `gridworld:drone`, a map file or `tabular:FrozenLake-v1`, for the exact table of a
+            model; a gridworld or another model; a table that is solved already; any `Estimator`,
+            such as one of your own; or an agent. Of others, who know nothing of their future until
+            they are fitted: a file of Stable-Baselines3 or CleanRL, a loaded model, a `Policy`, or
+            a function from an observation to an action's number, or from observations to
+            probabilities.
         env: where it acts, if that is not where it was made for: a Gymnasium id, an environment, a
             function that makes one, or a model or its name. An estimator of your own needs it, and
             so does an agent of others; that can also act in an Atari game.
@@ -237,7 +238,7 @@ def fit(
         check_free_for_fit(Path(out))
     frozen, chosen = _agent(agent, env), FitSettings(**{"seed": seed} | settings)
     policy = acting(frozen.policy or frozen.estimator)
-    own = getattr(getattr(policy, "about", None), "gamma", None)
+    own = getattr(policy, "gamma", None)
     if own is None:
         own = 0.99 if isinstance(frozen.estimator, Unfitted) else frozen.estimator.time_axis.gamma
     axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)

@@ -132,7 +132,7 @@ def test_a_checkpoint_is_named_by_its_step(trained):
     np.testing.assert_array_equal(values[1], values[2])
     with pytest.raises(InputError, match=r"no checkpoint at step 7\. There are: 400, 600\."):
         find_agent(f"{trained}@7")
-    with pytest.raises(InputError, match=r"'last' is no step .* There are: 400, 600\."):
+    with pytest.raises(InputError, match=r"'last' is no step .* There are: 400, 600, and best\."):
         find_agent(f"{trained}@last")
 
 

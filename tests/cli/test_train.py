@@ -91,7 +91,7 @@ def test_the_help_has_every_setting_under_its_heading(trdlab, kind):
         "Arguments", "Options", "Run", "Time axis", "Acting", "Learning", "Reward and ending",
         "Evaluation", "Running",
     ]  # fmt: skip
-    keys = [*preset(kind, "X").to_config(), "learning_rate_end", "weights"]
+    keys = [*preset(kind, "X").to_config(), "learning_rate_end", "max_grad_norm", "weights"]
     for key in keys[2:]:
         assert re.search(rf"{flag(key)}\b", out), key
     assert "--w " in shown["Time axis"]
@@ -189,7 +189,10 @@ def test_options_of_every_type_and_which_of_preset_file_and_option_wins(trdlab, 
         ),
         (["gym", "CartPole-v1", "--env-arg", "gravity"], "'gravity' is not KEY=VALUE."),
         (["gym", "CartPole-v1", "--preset", "clasic"], "Did you mean 'classic'?"),
-        (["gym", "CartPole-v1", "--preset", "paper"], "no preset 'paper' for gym. Known: classic"),
+        (
+            ["gym", "CartPole-v1", "--preset", "paper"],
+            "no preset 'paper' for gym. Known: acrobot, classic",
+        ),
         (["gym", "CartPole-v1", "--config", "none.toml"], "'none.toml' cannot be read"),
         (["gym", "CartPole-v1", "--learning-rat", "1"], "No such option"),
         (["gym", "CartPole-v1", "--N", "2.5"], "Invalid value for '--N'"),
@@ -304,13 +307,20 @@ def test_a_run_from_start_to_score(trdlab, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, err = trdlab("train", "gym", "CartPole-v1", *SMALL)
     assert code == 0
-    run, memory, first, *_, trained, kept = err.splitlines()
+    run, origin, memory, first, *_, trained, kept, chance = err.splitlines()
     assert run == "Run: runs/CartPole-v1-N2-w1-seed1"
+    assert origin == "Settings: the preset classic, made for CartPole-v1."
     assert re.fullmatch(r"Replay memory: up to \d\.\d\d MB(, of .* GB that are free)?\.", memory)
     assert first == "1 of 120 steps, score –, loss –"
     assert re.fullmatch(r"Trained 120 agent steps in \d+ seconds?\.", trained)
     name = "step-120-episodes-3-epsilon-0-seed-1000.json"
     assert kept == f"Kept: runs/CartPole-v1-N2-w1-seed1/evaluations/{name}"
+    assert re.fullmatch(
+        r"(Nothing shows that it plays better|It plays worse) than chance: random actions reach "
+        r"[\d.]+ in as many episodes\. Train longer: trdlab resume runs/CartPole-v1-N2-w1-seed1 "
+        r"--agent-steps 240; or try other settings, such as --epsilon-hold 10\.",
+        chance,
+    )
     assert out.startswith("3 episodes, greedy, seed 1000; raw rewards, undiscounted\n")
     assert "mean return" in out
     assert "error" not in err
@@ -367,7 +377,12 @@ def test_an_evaluation_that_would_never_return_is_cut_off(trdlab, tmp_path):
     data = json.loads(out)
     assert (code, data["lengths"], data["max_steps"]) == (0, [7, 7, 7], 7)
     assert err.endswith("seed-1000-max-steps-7.json\n")
-    assert len(list((tmp_path / "run" / "evaluations").iterdir())) == 2
+    evaluations = list((tmp_path / "run" / "evaluations").iterdir())
+    assert {path.name.partition("episodes-3-")[2] for path in evaluations} == {
+        "epsilon-0-seed-1000.json",
+        "epsilon-1-seed-1000.json",  # of random actions, to compare with
+        "epsilon-0-seed-1000-max-steps-7.json",
+    }
 
 
 def test_the_environments_own_limit_is_enough(trdlab, trained):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from trdlab.deep.presets import DEFAULT_PRESETS, PRESETS, preset
+from trdlab.deep.presets import DEFAULT_PRESETS, PRESETS, preset, preset_line
 from trdlab.deep.settings import TrainSettings, UpdateSettings
 from trdlab.errors import InputError
 
@@ -190,6 +190,29 @@ def test_every_preset_can_be_used_and_says_what_it_is_for():
             assert preset(kind, "X", name).to_config().items() >= lines.items()
     with pytest.raises(InputError, match=r"no preset 'smok' for gym\. Did you mean 'smoke'\?"):
         preset("gym", "CartPole-v1", "smok")
+
+
+@pytest.mark.parametrize(
+    ("kind", "env", "name", "said"),
+    [
+        ("gym", "CartPole-v1", None, "classic, made for CartPole-v1."),
+        ("gym", "Acrobot-v1", None, "acrobot, made for Acrobot-v1."),
+        ("gym", "MountainCar-v0", None, "mountain-car, made for MountainCar-v0."),
+        ("gym", "MountainCar-v0", "mountain-car", "mountain-car, made for MountainCar-v0."),
+        ("gym", "LunarLander-v2", None, "lunar-lander, made for LunarLander-v2."),
+        ("gym", "MountainCar-v0", "smoke", "smoke."),
+        ("gym", "Taxi-v3", None, "classic. None are known for Taxi-v3: it may need others."),
+        ("gym", "Taxi-v3", "classic", "classic."),
+        ("gym", "mine:CartPole-v1", None, "classic. None are known for mine:CartPole-v1: it may "),
+        ("gym", "CartPole", None, "classic. None are known for CartPole: it may need others."),
+        ("atari", "Breakout", None, "paper."),
+        ("atari", "CartPole-v1", None, "paper."),
+    ],
+)
+def test_an_environment_that_is_known_has_settings_of_its_own(kind, env, name, said):
+    assert preset_line(kind, env, name).startswith(f"Settings: the preset {said}")
+    wanted = said.split()[0].rstrip(",.")
+    assert preset(kind, env, name) == preset(kind, env, wanted)
 
 
 def test_the_paper_s_settings():

@@ -202,6 +202,14 @@ def test_epsilon_is_the_share_of_random_actions():
     assert (taken == 0).mean() == pytest.approx(0.75, abs=0.05)
 
 
+def test_nothing_is_held_beyond_the_end_of_an_episode():
+    trainer = scripted(STORY, epsilon_hold=1000, learning_starts=10**6)
+    for _ in range(12):
+        trainer.step()
+        _, event = STORY[(trainer.agent_steps - 1) % len(STORY)]
+        assert (trainer.exploring.left[0] == 0) == (event in (END, CUT))
+
+
 @pytest.mark.parametrize("num_envs", [1, 3, 8])
 def test_updates_are_made_when_they_are_due_whatever_the_number_of_environments(num_envs):
     trainer = scripted(*[STORY] * num_envs, learning_starts=20, update_every=4)
@@ -249,6 +257,7 @@ def on_cart_pole(num_envs: int, seed: int = 3) -> Trainer:
         target_sync_updates=7,
         learning_rate_end=1e-5,
         epsilon_steps=400,
+        epsilon_hold=6,
         double=True,
     )
     return Trainer(told, GymEnvironments("CartPole-v1", num_envs, seed=seed))

@@ -15,7 +15,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from trdlab.errors import InputError, OutputError, TrdlabError
-from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_arrays, save_checkpoint
+from trdlab.runs import (
+    RunFolder,
+    best_step,
+    checkpoint_steps,
+    find_checkpoint,
+    load_checkpoint,
+    read_arrays,
+    save_checkpoint,
+)
 from trdlab.runs.index import Index
 from trdlab.runs.state import DTYPES, pack, unpack
 
@@ -150,6 +158,46 @@ def test_blocks_are_written_once_and_deleted_with_the_last_checkpoint_that_needs
         assert loaded.step == step
         assert loaded.blocks == some_blocks(*numbers)
         assert same(loaded.state, a_state(step))
+
+
+def test_the_best_is_kept_however_old_it_is(run):
+    assert best_step(run) is None
+    for step, score in enumerate((None, 3.0, 7.0, 7.0, -1.0, 2.0, None), start=1):
+        save_checkpoint(run, step, a_state(step), some_blocks(step), score=score)
+    assert (checkpoint_steps(run), best_step(run)) == ([4, 6, 7], 4)  # of tied ones the newest
+    assert same(load_checkpoint(run, 4).state, a_state(4))
+    assert load_checkpoint(run, 4).blocks == some_blocks(4)
+    save_checkpoint(run, 8, a_state(8), score=8.0)
+    assert (checkpoint_steps(run), best_step(run)) == ([7, 8], 8)
+    save_checkpoint(run, 7, a_state(9), score=1.0)  # the run went back: that past did not happen
+    assert (checkpoint_steps(run), best_step(run)) == ([7], 7)
+
+
+def test_a_torn_score_is_none(run):
+    for step, score in ((1, 5.0), (2, 4.0)):
+        save_checkpoint(run, step, a_state(step), score=score)
+    path = run.checkpoints / "000000001" / "score.json"
+    path.write_text("9.0")
+    assert best_step(run) == 2
+    save_checkpoint(run, 3, a_state(3), score=1.0)
+    assert checkpoint_steps(run) == [2, 3]
+
+
+def test_a_checkpoint_has_a_name(run):
+    save_checkpoint(run, 1, a_state(1))
+    assert find_checkpoint(str(run.path)) == (run.path, None)
+    assert find_checkpoint(f"{run.path}@7") == (run.path, 7)
+    with pytest.raises(
+        InputError, match=r"No checkpoint of '.*' has a score: no episode had ended"
+    ):
+        find_checkpoint(f"{run.path}@best")
+    with pytest.raises(InputError, match=r"'bets' is no step of .*\. There are: 1, and best\."):
+        find_checkpoint(f"{run.path}@bets")
+    save_checkpoint(run, 2, a_state(2), score=-3.5)
+    assert find_checkpoint(f"{run.path}@best") == (run.path, 2)
+    odd = run.path.with_name("odd@best")  # a name that is there names itself
+    odd.mkdir()
+    assert find_checkpoint(str(odd)) == (odd, None)
 
 
 def test_going_back_replaces_what_came_after(run):

@@ -13,7 +13,16 @@ from trdlab.deep.settings import TrainSettings
 from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary
 from trdlab.show.text import plain_ascii
-from trdlab.show.training import duration, evaluation_page, memory_line, plan_page, runs_page
+from trdlab.show.training import (
+    best_line,
+    chance_line,
+    duration,
+    evaluation_page,
+    longer_line,
+    memory_line,
+    plan_page,
+    runs_page,
+)
 from trdlab.training.setup import Plan
 
 CART = TrainSettings("gym", "CartPole-v1", horizon=40)
@@ -33,6 +42,46 @@ def test_a_plan_shows_a_configuration_that_can_be_used_and_what_it_takes():
     assert "Replay memory: up to 2.10 GB, of 24.00 GB that are free." in rest
     assert "Time: about 5.6 hours, at 123 agent steps a second" in rest
     assert "Nothing was written" in rest
+
+
+def test_a_plan_says_where_its_settings_are_from():
+    page = plan_page(Plan(CART, 1, None, 1, 1), "Settings: the preset smoke.")
+    lines, _, rest = page.plain.partition("\n\n")
+    assert tomllib.loads(lines) == CART.to_config()
+    assert rest.startswith("Settings: the preset smoke.\n")
+
+
+@pytest.mark.parametrize(
+    ("returns", "said"),
+    [
+        ([-200.0] * 20, "Nothing shows that it plays better than chance: random actions reach "),
+        ([-200.0] * 19 + [-199.0], "Nothing shows that it plays better than chance: "),
+        ([-150.0] * 20, ""),
+        ([-190.0, -180.0] * 10, ""),
+        ([-150.0, -250.0] * 10, "Nothing shows that it plays better than chance: "),
+        ([-210.0] * 20, "It plays worse than chance: random actions reach -200.0 in as many "),
+    ],
+)
+def test_an_agent_that_is_no_better_than_chance_is_told_of(returns, said):
+    line = chance_line(evaluation(returns), evaluation([-200.0] * 20, 1.0), "Train longer.")
+    assert line.startswith(said)
+    assert bool(line) == bool(said) == line.endswith("in as many episodes. Train longer.")
+
+
+def test_episodes_that_begin_alike_are_compared_with_each_other():
+    chance = [float(10 * at) for at in range(20)]  # which differ far more than what was gained
+    better = chance_line(evaluation([of + 1.0 for of in chance]), evaluation(chance), "")
+    worse = chance_line(evaluation([of - 1.0 for of in chance]), evaluation(chance), "")
+    assert (better, worse.split(":")[0]) == ("", "It plays worse than chance")
+
+
+def test_how_a_longer_run_goes_on():
+    assert longer_line(CART, 50) == "It takes 100,000 agent steps now."
+    kept = best_line(Path("my runs/a"), 9000, 8000)
+    assert kept == (
+        "Its score was better at 8,000 agent steps: that checkpoint is kept as 'my runs/a'@best."
+    )
+    assert best_line(Path("a"), 9000, None) == ""
 
 
 def test_memory_where_nobody_knows_what_is_free():

@@ -20,11 +20,14 @@ import torch
 from gymnasium.envs.classic_control import CartPoleEnv
 from safetensors.torch import save_file
 
+import trdlab.runs.folder as folder_module
+from trdlab.agents.naming import find_agent
 from trdlab.cli import main
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.runs import (
     RunFolder,
+    best_step,
     checkpoint_steps,
     list_runs,
     load_checkpoint,
@@ -193,7 +196,10 @@ def test_a_run_tells_what_happens_and_keeps_it(tmp_path):
     kept = read_metrics(run.folder.metrics)
     assert [row["agent_steps"] for row in kept] == list(range(10, 121, 10))
     assert all(kept[at]["loss"] == rows[at].loss for at in range(12))
-    assert checkpoint_steps(run.folder) == [90, 120]
+    assert checkpoint_steps(run.folder) == [60, 90, 120]
+    assert best_step(run.folder) == 60  # of the best score, and so not too old
+    scores = {row["agent_steps"]: row["score"] or 0 for row in kept}
+    assert max((scores[at], at) for at in (30, 60, 90, 120))[1] == 60
     assert kept[-1]["seconds"] > kept[0]["seconds"] > 0
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     assert manifest["environment"]["observation"] == {"shape": [4], "dtype": "float32"}
@@ -246,8 +252,8 @@ def test_the_precision_that_was_measured_is_kept(tmp_path, monkeypatch):
 
 def test_an_older_checkpoint_can_be_gone_back_to(trained, whole):
     assert result(finish(trained, step=90)) == result(whole)
-    with pytest.raises(InputError, match=r"no checkpoint at step 60\. There are: 90, 120\."):
-        finish(trained, step=60)
+    with pytest.raises(InputError, match=r"no checkpoint at step 70\. There are: 60, 90, 120\."):
+        finish(trained, step=70)
 
 
 def test_a_run_at_its_end_is_only_evaluated_again(trained, whole, trdlab):
@@ -294,6 +300,95 @@ def test_runs_that_begin_at_once_get_names_of_their_own(tmp_path, monkeypatch):
     Path("runs").touch()
     with pytest.raises(OutputError, match="Cannot make"), begin(settings()):
         pass
+
+
+# ---- longer --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stopped", [47, 120])
+def test_a_run_that_is_made_longer_is_the_run_that_was_to_be_so_long(tmp_path, stopped):
+    whole = train(tmp_path / "whole", agent_steps=200)
+    with begin(settings(), tmp_path / "run") as run:
+        carry_on(run, should_stop=lambda: run.trainer.agent_steps == stopped)
+    comment = "# mine\n"
+    config = tmp_path / "run" / "config.toml"
+    config.write_text(config.read_text() + comment)
+    with resume(tmp_path / "run", agent_steps=200) as run:
+        assert carry_on(run)
+    assert result(tmp_path / "run") == result(whole)
+    folder = RunFolder.open(tmp_path / "run")
+    assert folder.config["agent_steps"] == 200
+    assert config.read_text().endswith(comment)
+    [told] = folder.manifest["extended"]
+    assert (told["agent_steps"], told["at"]) == (200, stopped)
+    assert folder.manifest["config"]["agent_steps"] == 120  # as it began
+    finish(tmp_path / "run")
+    before = contents(tmp_path / "run")
+    with resume(tmp_path / "run", agent_steps=200) as run:  # nothing new
+        assert run.trainer.done
+    assert contents(tmp_path / "run") == before
+
+
+def test_a_learning_rate_that_falls_falls_to_the_new_end(tmp_path, trdlab):
+    out = train(tmp_path / "run", learning_rate=1.0, learning_rate_end=0.0)
+    code, _, err = trdlab("resume", out, "--agent-steps", 240)
+    assert (code, err.splitlines()[1]) == (
+        0,
+        "It takes 240 agent steps now; its learning rate is 0.5 again, and falls to 0 by then.",
+    )
+    rates = {
+        row["agent_steps"]: row["learning_rate"] for row in read_metrics(out / "metrics.jsonl")
+    }
+    told = [rates[at] for at in (60, 120, 180, 240)]
+    assert told == pytest.approx([0.5, 0.0, 0.25, 0.0])
+
+
+def test_a_run_does_not_become_shorter(trained, trdlab):
+    before = contents(trained)
+    message = "--agent-steps is 60, and the run takes 120 already. Choose more: a run can become"
+    refused(trdlab("resume", trained, "--agent-steps", 60), 2, message)
+    assert contents(trained) == before
+
+
+def test_a_run_that_is_killed_while_it_is_made_longer_stays_whole(trained, whole, monkeypatch):
+    write = folder_module.write_whole
+
+    def fail(path: Path, write_to: Any) -> None:
+        if path.name == "config.toml":
+            raise OutputError("killed")
+        write(path, write_to)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(folder_module, "write_whole", fail)
+        with pytest.raises(OutputError, match="killed"), resume(trained, agent_steps=200):
+            pass
+    assert RunFolder.open(trained).config["agent_steps"] == 120
+    assert result(finish(trained)) == result(whole)
+    with resume(trained, agent_steps=200) as run:
+        assert not run.trainer.done
+    assert RunFolder.open(trained).config["agent_steps"] == 200
+
+
+@pytest.mark.parametrize("spoilt", [3, [3], [{}]])
+def test_a_manifest_that_tells_of_nothing_readable_is_torn(trained, trdlab, spoilt):
+    manifest = json.loads((trained / "manifest.json").read_text())
+    (trained / "manifest.json").write_text(json.dumps(manifest | {"extended": spoilt}))
+    refused(trdlab("resume", trained), 1, "manifest.json' is torn: its 'extended' is no list of")
+
+
+# ---- the best ------------------------------------------------------------------------------------
+
+
+def test_the_best_checkpoint_is_named_by_all(trained, trdlab):
+    assert trdlab("resume", trained)[2].splitlines()[-1] == (
+        f"Its score was better at 60 agent steps: that checkpoint is kept as {trained}@best."
+    )
+    code, _, err = trdlab("evaluate", f"{trained}@best", "--episodes", 1)
+    assert (code, "step-60-episodes-1" in err) == (0, True)
+    message = f"'{trained}@best' names a checkpoint, as --checkpoint does. Use one of them."
+    refused(trdlab("evaluate", f"{trained}@best", "--checkpoint", 90), 2, message)
+    assert find_agent(f"{trained}@best").name == "run@60"
+    assert trdlab("resume", f"{trained}@best")[0] == 0
 
 
 # ---- refused -------------------------------------------------------------------------------------

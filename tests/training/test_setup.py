@@ -18,6 +18,7 @@ from trdlab.training.setup import (
     default_path,
     describe,
     make_environments,
+    origin_line,
     plan,
     read_settings,
 )
@@ -66,6 +67,15 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path, lines, message):
         read_settings("gym", "CartPole-v1", None, written(tmp_path / "run.toml", *lines), {})
     with pytest.raises(InputError, match=r"none\.toml' cannot be read: No such file"):
         read_settings("gym", "CartPole-v1", None, tmp_path / "none.toml", {})
+
+
+def test_where_settings_are_from_is_said(tmp_path):
+    complete = written(tmp_path / "run.toml", to_toml(CART.to_config()))
+    few = written(tmp_path / "few.toml", "N = 3")
+    assert origin_line("gym", "CartPole-v1", None, complete) == f"Settings: those of '{complete}'."
+    for config in (None, few):
+        line = "Settings: the preset classic, made for CartPole-v1."
+        assert origin_line("gym", "CartPole-v1", None, config) == line
 
 
 def test_a_run_has_a_name_of_its_own(tmp_path, monkeypatch):

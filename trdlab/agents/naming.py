@@ -34,10 +34,11 @@ def find_agent(
 ) -> Agent:
     """Returns an agent by its name.
 
-    That is a run's folder, or `RUN@STEP` for an older checkpoint of it; or, for the exact table of
-    a model, `gridworld:NAME`, a map file, or `tabular:ENV_ID`, each with what to make it with after
-    commas, such as `gridworld:ledge,slip=0.2`; or a file of an agent that another library trained,
-    or `python:FILE.py:FUNCTION`, whose function makes one.
+    That is a run's folder, or `RUN@STEP` for an older checkpoint of it, or `RUN@best` for the one
+    of the best score; the folder of a fit; for the exact table of a model, `gridworld:NAME`, a map
+    file, or `tabular:ENV_ID`, each with what to make it with after commas, such as
+    `gridworld:ledge,slip=0.2`; a file of an agent that another library trained, or
+    `python:FILE.py:FUNCTION`, whose function makes one.
 
     Args:
         name: of the agent.
@@ -68,8 +69,9 @@ def find_agent(
     if is_fit(Path(name)):
         return _fitted(name, env, env_arguments)
     from trdlab.agents.runs import run_agent
+    from trdlab.runs import find_checkpoint
 
-    path, step = _checkpoint(name)
+    path, step = find_checkpoint(name)
     return run_agent(path, step=step, **where)
 
 
@@ -109,22 +111,6 @@ def _refuse_model(name: str) -> None:
         raise InputError(f"There is no run '{name}'.", f"For the map: {GRIDWORLD}{name}")
     if called in toy_text_ids():
         raise InputError(f"There is no run '{name}'.", f"For the exact table: {TABULAR}{name}")
-
-
-def _checkpoint(name: str) -> tuple[Path, int | None]:
-    """Returns the folder of a run, and the step of the checkpoint that is named after an `@`."""
-    folder, at, step = name.rpartition("@")
-    if not at or not folder or Path(name).exists():
-        return Path(name), None
-    if step.isdecimal() and len(step) < 19:  # more digits are no number of steps
-        return Path(folder), int(step)
-    from trdlab.runs import RunFolder, checkpoint_steps
-
-    steps = checkpoint_steps(RunFolder.open(Path(folder)))
-    raise InputError(
-        f"'{step}' is no step of a checkpoint of '{folder}'.",
-        f"There are: {', '.join(map(str, steps))}." if steps else "There is none yet.",
-    )
 
 
 def find_pair(

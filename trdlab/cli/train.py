@@ -13,7 +13,8 @@ from trdlab.cli.options import with_settings
 from trdlab.deep.presets import DEFAULT_PRESETS, PRESETS
 
 if TYPE_CHECKING:
-    from trdlab.deep.settings import Kind
+    from trdlab.deep.settings import Kind, TrainSettings
+    from trdlab.rollouts.evaluation import Evaluation
     from trdlab.training.run import Run
 
 train = typer.Typer(help="Train a network that decomposes.", no_args_is_help=True)
@@ -22,7 +23,8 @@ train = typer.Typer(help="Train a network that decomposes.", no_args_is_help=Tru
 def _presets(kind: "Kind") -> Any:
     """Returns the option that names where settings begin, with a help that lists them."""
     known = "; ".join(f"{name}: {about}" for name, (about, _) in PRESETS[kind].items())
-    shown = DEFAULT_PRESETS[kind]
+    own = "that of the environment, or " if kind == "gym" else ""
+    shown = f"{own}{DEFAULT_PRESETS[kind]}"
     return typer.Option(
         "--preset", metavar="NAME", help=f"Settings to begin from. {known}.", show_default=shown
     )
@@ -42,7 +44,12 @@ Out = Annotated[
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say what it would take, and write nothing.")
 ]
-RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="The run's folder.")]
+RunPath = Annotated[
+    Path,
+    typer.Argument(
+        metavar="RUN", help="The run's folder; RUN@STEP or RUN@best for another checkpoint."
+    ),
+]
 Checkpoint = Annotated[
     int | None,
     typer.Option("--checkpoint", metavar="STEP", help="An older one.", show_default="the newest"),
@@ -69,7 +76,8 @@ def train_gym(
 ) -> None:
     """Train on a Gymnasium environment.
 
-    Settings come from the preset, then from --config, then from the options.
+    Settings come from the preset, then from --config, then from the options. A task that is known
+    has a preset of its own; the defaults that are shown here are those of classic.
     """
     _train("gym", env_id, preset, config, out, dry_run, given or {})
 
@@ -95,13 +103,20 @@ def train_atari(
 def resume(
     run: RunPath,
     checkpoint: Checkpoint = None,
+    agent_steps: Annotated[
+        int | None,
+        typer.Option(
+            "--agent-steps", help="Steps in all, if more than before.", show_default="as it began"
+        ),
+    ] = None,
     modules: common.Import = None,
     verbose: common.Verbose = False,
 ) -> None:
-    """Go on with a run that was stopped, exactly as if it had not been."""
+    """Go on with a run that was stopped, exactly as if it had not been; or make it longer."""
     from trdlab.training.run import resume as pick_up
 
-    _carry_on(lambda: pick_up(run, checkpoint))
+    path, step = _named(run, checkpoint)
+    _carry_on(lambda: pick_up(path, step, agent_steps=agent_steps), longer=agent_steps is not None)
 
 
 def evaluate(
@@ -139,26 +154,16 @@ def evaluate(
 
     The score is the plain sum of the rewards that the environment pays.
     """
-    from trdlab.cli.progress import EpisodeProgress
-    from trdlab.show.training import evaluation_page
-    from trdlab.training.loading import evaluate_run
-
-    errors = _errors()
-    with EpisodeProgress(errors) as progress:
-        result, kept = evaluate_run(
-            run,
-            episodes=episodes,
-            epsilon=epsilon,
-            seed=seed,
-            step=checkpoint,
-            max_steps=max_steps,
-            watch=progress.on_progress,
-        )
-    if as_json:
-        common.print_json(result.to_dict())
-    else:
-        common.print_text(evaluation_page(result))
-    _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
+    path, step = _named(run, checkpoint)
+    _evaluate(
+        path,
+        as_json,
+        episodes=episodes,
+        epsilon=epsilon,
+        seed=seed,
+        step=step,
+        max_steps=max_steps,
+    )
 
 
 def runs(
@@ -200,24 +205,40 @@ def _train(
     given: dict[str, Any],
 ) -> None:
     from trdlab.training.run import begin
-    from trdlab.training.setup import plan, read_settings
+    from trdlab.training.setup import origin_line, plan, read_settings
 
     settings = read_settings(kind, env, preset_name, config, given)
+    origin = origin_line(kind, env, preset_name, config)
     if dry_run:
         from trdlab.show.training import plan_page
 
-        common.print_text(plan_page(plan(settings)))
+        common.print_text(plan_page(plan(settings), origin))
         return
-    _carry_on(lambda: begin(settings, out))
+    _carry_on(lambda: begin(settings, out), origin)
 
 
-def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
-    """Trains a run to its end or to the next signal, and evaluates it at the end."""
+def _carry_on(
+    open_run: Callable[[], "AbstractContextManager[Run]"], origin: str = "", *, longer: bool = False
+) -> None:
+    """Trains a run to its end or to the next signal, and evaluates it at the end.
+
+    Args:
+        open_run: begins it, or picks it up.
+        origin: where its settings are from, to be said.
+        longer: whether it was told to take more steps, to be said too.
+    """
     from trdlab.cli.progress import TrainingProgress, stopping
     from trdlab.deep.memory import available_memory
     from trdlab.environments.faults import EnvironmentFault
     from trdlab.errors import OutputError
-    from trdlab.show.training import duration, memory_line, updates_lines
+    from trdlab.runs import best_step
+    from trdlab.show.training import (
+        best_line,
+        duration,
+        longer_line,
+        memory_line,
+        updates_lines,
+    )
     from trdlab.training.run import carry_on
 
     errors = _errors()
@@ -225,6 +246,10 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
         path, settings = run.folder.path, run.trainer.settings
         go_on = f"Go on: {run.folder.resume_command}"
         _say(errors, f"Run: {path}")
+        if origin:
+            _say(errors, origin)
+        if longer:
+            _say(errors, longer_line(settings, run.trainer.agent_steps))
         _say(errors, memory_line(run.memory, available_memory()))
         for line in updates_lines(settings):
             _say(errors, line)
@@ -246,8 +271,55 @@ def _carry_on(open_run: Callable[[], "AbstractContextManager[Run]"]) -> None:
             _say(errors, go_on)
             raise typer.Exit(stop.code or 0)
     _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
+    if line := best_line(path, steps, best_step(run.folder)):
+        _say(errors, line)
     if settings.evaluate_episodes:
-        evaluate(path)
+        _compare_with_chance(path, _evaluate(path), settings)
+
+
+def _named(run: Path, checkpoint: int | None) -> tuple[Path, int | None]:
+    """Returns the folder of a run, and the step of the checkpoint that is named, if one is."""
+    from trdlab.errors import InputError
+    from trdlab.runs import find_checkpoint
+
+    path, step = find_checkpoint(str(run))
+    if step is not None and checkpoint is not None:
+        raise InputError(f"'{run}' names a checkpoint, as `checkpoint` does.", "Use one of them.")
+    return path, checkpoint if step is None else step
+
+
+def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
+    """Evaluates the agent of a run, prints the result, and says where it is kept."""
+    from trdlab.cli.progress import EpisodeProgress
+    from trdlab.show.training import evaluation_page
+    from trdlab.training.loading import evaluate_run
+
+    errors = _errors()
+    with EpisodeProgress(errors) as progress:
+        result, kept = evaluate_run(path, **how, watch=progress.on_progress)
+    if as_json:
+        common.print_json(result.to_dict())
+    else:
+        common.print_text(evaluation_page(result))
+    _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
+    return result
+
+
+def _compare_with_chance(path: Path, result: "Evaluation", settings: "TrainSettings") -> None:
+    """Says so if an agent plays no better than random actions do."""
+    from trdlab.cli.progress import EpisodeProgress
+    from trdlab.show.training import chance_line
+    from trdlab.training.loading import evaluate_run
+
+    errors = _errors()
+    with EpisodeProgress(errors) as progress:
+        chance, _ = evaluate_run(path, epsilon=1.0, watch=progress.on_progress)
+    more = common.command(["resume", str(path)], {"--agent-steps": str(2 * settings.agent_steps)})
+    cure = f"Train longer: {more}; or try other settings"
+    if settings.epsilon_hold == 1:
+        cure += ", such as --epsilon-hold 10"
+    if line := chance_line(result, chance, f"{cure}."):
+        _say(errors, line)
 
 
 def _errors() -> Console:

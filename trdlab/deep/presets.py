@@ -65,19 +65,108 @@ PRESETS["atari"]["smoke"] = (
         "log_every": 500,
     },
 )
+_FAR: Config = {
+    "num_envs": 8,
+    "learning_starts": 2_000,
+    "learning_rate_end": 0.0,
+    "batch_size": 64,
+    "hidden": [128, 128],
+    "epsilon_end": 0.05,
+}
+"""What tasks share whose goal random play seldom reaches: they hold a random action, too."""
+PRESETS["gym"] |= {
+    "acrobot": (
+        "for Acrobot, whose goal random play seldom reaches",
+        _FAR
+        | {
+            "epsilon_steps": 20_000,
+            "epsilon_hold": 4,
+            "update_every": 1,
+            "learning_rate": 6.3e-4,
+            "loss": "huber",
+            "max_grad_norm": 10.0,
+        },
+    ),
+    "mountain-car": (
+        "for MountainCar, whose goal random play never reaches",
+        _FAR
+        | {
+            "agent_steps": 80_000,
+            "gamma": 0.98,
+            "epsilon_steps": 30_000,
+            "epsilon_hold": 30,  # a car that is pushed to and fro at random stays where it is
+            "update_every": 2,
+            "target_sync_updates": 150,
+            "capacity": 50_000,
+        },
+    ),
+    "lunar-lander": (
+        "for LunarLander, whose single rewards are large",
+        {
+            "agent_steps": 200_000,
+            "num_envs": 8,
+            "learning_starts": 2_000,
+            "epsilon_end": 0.1,  # with less, and without holding, it learns to hover for ever
+            "epsilon_steps": 30_000,
+            "epsilon_hold": 4,
+            "batch_size": 128,
+            "learning_rate_end": 1e-4,
+            "loss": "huber",
+            "max_grad_norm": 10.0,
+            "hidden": [256, 256],
+            "capacity": 200_000,
+        },
+    ),
+}
 DEFAULT_PRESETS: dict[Kind, str] = {"gym": "classic", "atari": "paper"}
+_TRIED = {
+    "CartPole": "classic",
+    "Acrobot": "acrobot",
+    "MountainCar": "mountain-car",
+    "LunarLander": "lunar-lander",
+}
+"""The presets that were found for an environment, by its name without the version."""
 
 
 def preset(kind: Kind, env: str, name: str | None = None) -> TrainSettings:
-    """Returns the settings of a preset, by default the first of its kind.
+    """Returns the settings of a preset, by default the one for this environment.
 
     Raises:
         InputError: there is no such preset.
 
     >>> preset("atari", "Breakout").horizon
     40
+    >>> preset("gym", "MountainCar-v0").gamma
+    0.98
     """
-    known, wanted = PRESETS[kind], name or DEFAULT_PRESETS[kind]
+    known, wanted = PRESETS[kind], name or default_preset(kind, env)
     if wanted not in known:
         raise InputError(f"There is no preset '{wanted}' for {kind}.", closest(wanted, known))
     return TrainSettings(kind, env).changed(known[wanted][1], f"The preset '{wanted}'")
+
+
+def default_preset(kind: Kind, env: str) -> str:
+    """Returns the name of the preset for an environment: its own, or else that of its kind."""
+    return _own(kind, env) or DEFAULT_PRESETS[kind]
+
+
+def preset_line(kind: Kind, env: str, name: str | None = None) -> str:
+    """Returns which preset it is, and what may be expected of it.
+
+    >>> preset_line("gym", "MountainCar-v0")
+    'Settings: the preset mountain-car, made for MountainCar-v0.'
+    >>> preset_line("gym", "Taxi-v3")
+    'Settings: the preset classic. None are known for Taxi-v3: it may need others.'
+    """
+    wanted = name or default_preset(kind, env)
+    if wanted == _own(kind, env):
+        return f"Settings: the preset {wanted}, made for {env}."
+    unknown = kind == "gym" and name is None
+    more = f" None are known for {env}: it may need others." if unknown else ""
+    return f"Settings: the preset {wanted}.{more}"
+
+
+def _own(kind: Kind, env: str) -> str | None:
+    """Returns the preset that was found for this very environment."""
+    name, _, version = env.rpartition("-v")
+    return _TRIED.get(name) if kind == "gym" and version.isdecimal() else None

@@ -112,6 +112,9 @@ class TrainSettings:
     )
     epsilon_end: float = option(0.05, "… and in the end.", "Acting", least=0, most=1)
     epsilon_steps: int = option(10_000, "Agent steps from the one to the other.", "Acting", least=0)
+    epsilon_hold: int = option(
+        1, "Steps to hold a random action: 1 to so many, drawn evenly.", "Acting", least=1
+    )
     learning_starts: int = option(
         1_000, "Agent steps, at random, before the first update.", "Learning", least=1
     )

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from trdlab.arrays import BoolArray, IntArray
+from trdlab.deep.exploring import Exploring
 from trdlab.deep.loss import greedy_actions
 from trdlab.deep.networks import build_network
 from trdlab.deep.replay import ReplayBuffer
@@ -87,6 +88,9 @@ class Trainer:
         )
         self.stack = FrameStack(self._reset(), environments.stack, environments.padding)
         self.scores = Scores(environments.num_envs)
+        self.exploring = Exploring(
+            environments.num_envs, environments.num_actions, settings.epsilon_hold
+        )
         self.agent_steps = 0
         self._losses, self._values, self._updates_told = 0.0, 0.0, 0
 
@@ -118,6 +122,7 @@ class Trainer:
         _check_step(step, f"after {self.agent_steps} agent steps")
         self._remember(frames, actions, step)
         self.scores.add(step)
+        self.exploring.drop(step.ended)
         self.stack.push(step.following, step.ended)
         self.agent_steps += len(actions)
         self._learn()
@@ -148,9 +153,8 @@ class Trainer:
 
     def _choose(self) -> IntArray:
         """Returns the actions `[B]`: at random with probability ε, else the greedy ones."""
-        num_envs, num_actions = self.environments.num_envs, self.environments.num_actions
-        explore = self.rng.random(num_envs) < self.settings.epsilon(self.agent_steps)  # [B]
-        actions = self.rng.integers(num_actions, size=num_envs)  # [B]
+        epsilon = self.settings.epsilon(self.agent_steps)
+        explore, actions = self.exploring.draw(epsilon, self.rng)  # [B], [B]
         if not explore.all():
             actions = np.where(explore, actions, self._greedy())
         return actions
@@ -196,6 +200,7 @@ class Trainer:
                 "rng": self.rng.bit_generator.state,
             },
             "scores": self.scores.state_dict(),
+            "exploring": self.exploring.state_dict(),
             "stack": self.stack.frames.copy(),
             "learner": self.learner.state_dict(),
             "memory": self.memory.state_dict(),
@@ -219,6 +224,8 @@ class Trainer:
         self._updates_told = progress["updates_told"]
         self.rng.bit_generator.state = progress["rng"]
         self.scores.load_state_dict(state["scores"])
+        if "exploring" in state:  # which older runs did not have
+            self.exploring.load_state_dict(state["exploring"])
         self.learner.load_state_dict(state["learner"])
         self.memory.load_state_dict(state["memory"])
         try:
@@ -227,6 +234,7 @@ class Trainer:
         except NotReproducible as problem:
             self.memory.interrupt()
             self.scores.drop()
+            self.exploring.drop(_all(self.environments.num_envs))
             self.stack.begin(self._reset(), _all(self.environments.num_envs))
             return problem
         self.stack.frames[...] = state["stack"]

@@ -5,7 +5,9 @@ Nothing here imports torch, and nothing that is read is ever executed.
 
 from trdlab.runs.checkpoint import (
     Checkpoint,
+    best_step,
     checkpoint_steps,
+    find_checkpoint,
     load_checkpoint,
     read_arrays,
     save_checkpoint,
@@ -20,7 +22,9 @@ __all__ = [
     "MetricsFile",
     "RunFolder",
     "RunSummary",
+    "best_step",
     "checkpoint_steps",
+    "find_checkpoint",
     "list_runs",
     "load_checkpoint",
     "read_arrays",

@@ -1,9 +1,9 @@
 """Checkpoints: each whole or not there, and every byte checked when it is read.
 
-A checkpoint is a folder `checkpoints/STEP` with `state.json`, one safetensors file for each
-top-level key of the state that holds arrays, and `index.json`, which lists these files, and the
-blocks that belong to it, with lengths and checksums. A block is a file in `replay/` that never
-changes, so that checkpoints can share it.
+A checkpoint is a folder `checkpoints/STEP` with `state.json`, `score.json` if there was a score,
+one safetensors file for each top-level key of the state that holds arrays, and `index.json`, which
+lists these files, and the blocks that belong to it, with lengths and checksums. A block is a file
+in `replay/` that never changes, so that checkpoints can share it.
 """
 
 import json
@@ -22,9 +22,11 @@ from trdlab.files import write_whole
 from trdlab.runs.folder import RunFolder
 from trdlab.runs.index import Index, Sum, check_names, read_whole
 from trdlab.runs.keeping import (
+    SCORE,
     Saved,
     all_saved,
     announce,
+    best_of,
     blocks_before,
     forget,
     new_folder,
@@ -34,6 +36,8 @@ from trdlab.runs.state import Arrays, pack, unpack
 
 Read = TypeVar("Read")
 STATE, TENSORS = "state.json", ".safetensors"
+BEST = "best"
+"""Instead of a step: the checkpoint of the best score."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +61,14 @@ def save_checkpoint(
     state: Mapping[str, Any],
     blocks: Mapping[str, Any] | None = None,
     *,
+    score: float | None = None,
     keep: int = 2,
 ) -> None:
     """Saves a checkpoint, and then deletes old ones and the blocks that none needs any more.
 
-    Checkpoints at this step or later are deleted then, too: the run went back, and they are of a
-    past that did not happen. Only the process that holds the run may save.
+    The one of the best score is never deleted for its age. Checkpoints at this step or later are
+    deleted, too: the run went back, and they are of a past that did not happen. Only the process
+    that holds the run may save.
 
     Args:
         run: the run.
@@ -70,7 +76,8 @@ def save_checkpoint(
         state: nested mappings and lists of JSON values, numpy arrays and bytes.
         blocks: bytes, or what can be read like them, by name. Those that the checkpoint before has,
             with the same contents, are not written again.
-        keep: how many checkpoints to keep, this one included.
+        score: by which checkpoints are compared, larger being better.
+        keep: how many checkpoints to keep, this one included, besides the best.
 
     Raises:
         InputError: the state holds what cannot be saved, or a key cannot name a file.
@@ -87,7 +94,7 @@ def save_checkpoint(
         announce(run, folder, {name: index.blocks[name] for name in new})
         for name, file in new.items():
             write_whole(run.replay / file, partial(Path.write_bytes, data=blocks[name]))
-        write_whole(folder, lambda temporary: _write(temporary, tree, arrays, index.blocks))
+        write_whole(folder, lambda temporary: _write(temporary, tree, arrays, index.blocks, score))
     except (OutputError, OSError) as error:
         with suppress(OSError):  # the first failure is the one to tell
             sweep(run)
@@ -126,7 +133,7 @@ def read_arrays(run: RunFolder, key: str, step: int | None = None) -> tuple[int,
         files = Index.read(saved.folder).files
         if name in files:
             return saved.step, _arrays(saved.folder / name, files[name])
-        keys = [name.removesuffix(TENSORS) for name in files if name != STATE]
+        keys = [name.removesuffix(TENSORS) for name in files if name.endswith(TENSORS)]
         cure = closest(key, keys) if keys else ""
         raise InputError(f"The checkpoint at step {saved.step} has no '{key}'.", cure)
 
@@ -138,8 +145,53 @@ def checkpoint_steps(run: RunFolder) -> list[int]:
     return list(_by_step(run))
 
 
+def find_checkpoint(name: str) -> tuple[Path, int | None]:
+    """Returns the folder of a run, and the step of the checkpoint that is named after an `@`.
+
+    Args:
+        name: a run's folder, for its newest checkpoint; `RUN@STEP`; or `RUN@best`, for the one of
+            the best score.
+
+    Raises:
+        InputError: there is no such run, or no such checkpoint of it.
+    """
+    folder, at, step = name.rpartition("@")
+    if not at or not folder or Path(name).exists():
+        return Path(name), None
+    if step.isdecimal() and len(step) < 19:  # more digits are no number of steps
+        return Path(folder), int(step)
+    run = RunFolder.open(Path(folder))
+    if step == BEST:
+        return run.path, _best_step(run)
+    steps = ", ".join(map(str, checkpoint_steps(run)))
+    raise InputError(
+        f"'{step}' is no step of a checkpoint of '{folder}'.",
+        f"There are: {steps}, and {BEST}." if steps else "There is none yet.",
+    )
+
+
+def best_step(run: RunFolder) -> int | None:
+    """Returns the step of the checkpoint of the best score; None while none has a score."""
+    best = best_of(_by_step(run).values())
+    return best and best.step
+
+
+def _best_step(run: RunFolder) -> int:
+    step = best_step(run)
+    if step is None:
+        raise InputError(
+            f"No checkpoint of '{run.path}' has a score: no episode had ended by then.",
+            f"Leave out @{BEST}, or train on: {run.resume_command}.",
+        )
+    return step
+
+
 def _write(
-    folder: Path, tree: dict[str, Any], arrays: dict[str, Arrays], blocks: Mapping[str, Sum]
+    folder: Path,
+    tree: dict[str, Any],
+    arrays: dict[str, Arrays],
+    blocks: Mapping[str, Sum],
+    score: float | None,
 ) -> None:
     """Writes all files of a checkpoint."""
     folder.mkdir()
@@ -152,6 +204,8 @@ def _write(
     write(STATE, json.dumps(tree, allow_nan=False).encode())
     for key, held in arrays.items():
         write(f"{key}{TENSORS}", save(held))
+    if score is not None:
+        write(SCORE, json.dumps(score, allow_nan=False).encode())
     Index(sums, blocks).write(folder)
 
 
@@ -173,7 +227,7 @@ def _load(run: RunFolder, saved: Saved) -> Checkpoint:
     arrays = {
         name.removesuffix(TENSORS): _arrays(folder / name, sum_)
         for name, sum_ in index.files.items()
-        if name != STATE
+        if name.endswith(TENSORS)
     }
     try:
         state = unpack(json.loads(read_whole(folder / STATE, index.files[STATE])), arrays)

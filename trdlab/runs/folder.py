@@ -2,8 +2,10 @@
 
 import json
 import platform
+import re
 import shlex
 import sys
+import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +15,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from trdlab.errors import InputError, OutputError, TrdlabError, closest
-from trdlab.files import check_own, read_json, write_whole
+from trdlab.files import check_own, read_json, write_json, write_whole
 from trdlab.runs.config import Config, read_config, to_toml
 from trdlab.runs.lock import hold
 
@@ -21,6 +23,8 @@ FORMAT = 1
 """Of the run folder; a change that older versions cannot read raises it."""
 PACKAGES = ("numpy", "torch", "gymnasium", "ale-py", "lz4", "safetensors")
 CONFIG, MANIFEST = "config.toml", "manifest.json"
+STEPS, EXTENDED = "agent_steps", "extended"
+"""What a run can be told anew, and where the manifest lists when it was."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,29 @@ class RunFolder:
             raise TrdlabError(error.cause, "Put it right, or begin another run.") from error
         _check_unchanged(path, config, manifest)
         return cls(path, config, manifest)
+
+    def extended(self, agent_steps: int, at: int) -> Self:
+        """Tells the run to take more agent steps than before, and its manifest that it was told.
+
+        The manifest comes first, and `config.toml` decides: whatever happens in between, the run
+        can be opened, and is as long as it was. Comments in the configuration stay.
+
+        Args:
+            agent_steps: to take in all.
+            at: those taken before.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        now = new_manifest()
+        told = {"agent_steps": agent_steps, "at": at, "command": now["command"]}
+        told["when"] = now["started"]
+        before = self.manifest.get(EXTENDED, [])
+        write_json(self.path / MANIFEST, {**self.manifest, EXTENDED: [*before, told]})
+        config = self.path / CONFIG
+        text = _with_steps(config.read_text(encoding="utf-8"), self.config, agent_steps)
+        write_whole(config, lambda path: path.write_text(text, encoding="utf-8"))
+        return self.open(self.path)
 
     @property
     def metrics(self) -> Path:
@@ -209,6 +236,8 @@ def _check_unchanged(path: Path, now: dict[str, Any], manifest: dict[str, Any]) 
     then = manifest.get("config")
     if not isinstance(then, dict):
         raise TrdlabError(f"'{path / MANIFEST}' is torn: it does not say what the run was told.")
+    if now.get(STEPS) in _later_steps(path, manifest):
+        then = then | {STEPS: now[STEPS]}
     changed = [key for key in then | now if then.get(key) != now.get(key)]
     if changed:
         key = changed[0]
@@ -217,6 +246,30 @@ def _check_unchanged(path: Path, now: dict[str, Any], manifest: dict[str, Any]) 
             f"'{path / CONFIG}' says {key} = {said}, and the run began with {was}.",
             "Put it back, or begin another run with that file.",
         )
+
+
+def _later_steps(path: Path, manifest: dict[str, Any]) -> list[Any]:
+    """Returns the agent steps that a run was told to take after it had begun."""
+    try:
+        return [told[STEPS] for told in manifest.get(EXTENDED, [])]
+    except (TypeError, LookupError) as error:
+        raise TrdlabError(
+            f"'{path / MANIFEST}' is torn: its '{EXTENDED}' is no list of what was told."
+        ) from error
+
+
+def _with_steps(text: str, config: dict[str, Any], agent_steps: int) -> str:
+    r"""Returns a configuration with other agent steps, and all else as somebody wrote it.
+
+    >>> _with_steps("N = 4\nagent_steps = 1e5  # many\n", {"N": 4, "agent_steps": 1e5}, 200)
+    'N = 4\nagent_steps = 200  # many\n'
+    """
+    wanted = {**config, STEPS: agent_steps}
+    edited = re.sub(rf"(?m)^({STEPS}[ \t]*=[ \t]*)[^\s#]+", rf"\g<1>{agent_steps}", text, count=1)
+    try:
+        return edited if tomllib.loads(edited) == wanted else to_toml(wanted)
+    except tomllib.TOMLDecodeError:
+        return to_toml(wanted)
 
 
 def _version(package: str) -> str | None:

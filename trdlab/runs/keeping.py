@@ -1,7 +1,7 @@
 """Which checkpoints are on disk, which are kept, and what may be deleted."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -9,9 +9,10 @@ from typing import NamedTuple
 from trdlab.errors import OutputError, TrdlabError
 from trdlab.files import free_name, is_leftover, remove, write_whole
 from trdlab.runs.folder import RunFolder
-from trdlab.runs.index import INDEX, Index, Sum
+from trdlab.runs.index import INDEX, Index, Sum, read_whole
 
 FOLDER = re.compile(r"(\d{9,})(?:\.(\d+))?")  # a step, and which attempt where there were several
+SCORE = "score.json"
 OLD = ".old"
 """After the name of a checkpoint whose parts may go, as far as its index names them."""
 
@@ -31,12 +32,26 @@ class Saved(NamedTuple):
         """
         return set(Index.read(self.folder).block_files.values())
 
+    def score(self) -> float | None:
+        """Returns the score of its agent; None if there was none, or it is torn."""
+        with suppress(TrdlabError, ValueError):
+            files = Index.read(self.folder).files
+            if SCORE in files:
+                return float(read_whole(self.folder / SCORE, files[SCORE]))
+        return None
+
 
 def all_saved(run: RunFolder) -> list[Saved]:
     """Returns the checkpoints on disk, the newest last."""
     paths = run.checkpoints.iterdir() if run.checkpoints.is_dir() else ()
     matches = [(FOLDER.fullmatch(path.name), path) for path in paths]
     return sorted(Saved(int(of[1]), int(of[2] or 1), path) for of, path in matches if of)
+
+
+def best_of(saved: Iterable[Saved]) -> Saved | None:
+    """Returns the checkpoint of the largest score, of tied ones the newest; None without scores."""
+    scores = [(score, each) for each in saved if (score := each.score()) is not None]
+    return max(scores)[1] if scores else None
 
 
 def new_folder(run: RunFolder, step: int) -> Path:
@@ -76,12 +91,12 @@ def announce(run: RunFolder, folder: Path, blocks: Mapping[str, Sum]) -> None:
 
 
 def forget(run: RunFolder, step: int, newest: Path, keep: int) -> None:
-    """Deletes what the newest checkpoint replaces, and the oldest ones."""
-    others = [saved for saved in all_saved(run) if saved.folder != newest]
-    earlier = [saved for saved in others if saved.step < step]
-    kept = earlier[max(0, len(earlier) - keep + 1) :]
+    """Deletes what the newest checkpoint replaces, and the oldest ones but for the best."""
+    saved = all_saved(run)
+    valid = [each for each in saved if each.step < step or each.folder == newest]
+    kept = {*valid[max(0, len(valid) - keep) :], best_of(valid)}
     try:
-        for folder in (saved.folder for saved in others if saved not in kept):
+        for folder in (each.folder for each in saved if each not in kept):
             folder.replace(_old(run, folder))  # gone at once; its files follow
         sweep(run)
     except OSError as error:

@@ -1,7 +1,10 @@
 """Runs on a terminal: what one will take, what it has reached, and all of them at a glance."""
 
 from collections.abc import Sequence
+from pathlib import Path
+from shlex import quote
 
+import numpy as np
 from rich.text import Text
 
 from trdlab.deep.settings import TrainSettings
@@ -12,14 +15,15 @@ from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary, to_toml
 from trdlab.show.tables import Row, Table
 from trdlab.show.text import columns, table_lines, wrapped
-from trdlab.statistics import Estimate
+from trdlab.statistics import Estimate, bootstrap
 from trdlab.training.setup import Plan
 
 
-def plan_page(plan: Plan) -> Text:
-    """Returns the resolved configuration, and the memory and time that it will take."""
+def plan_page(plan: Plan, origin: str = "") -> Text:
+    """Returns the resolved configuration, where it is from, and what it will take."""
     lines = [
         to_toml(plan.settings.to_config()),
+        *([origin] if origin else []),
         memory_line(plan.memory, plan.available),
         *updates_lines(plan.settings),
         f"Time: about {duration(plan.seconds)}, at {plan.steps_per_second:,.0f} agent steps a "
@@ -129,6 +133,57 @@ def updates_lines(settings: TrainSettings) -> list[str]:
         f"Nothing will be learned: updates begin after {settings.learning_starts:,} agent steps, "
         f"and the run ends after {settings.agent_steps:,}."
     ]
+
+
+def longer_line(settings: TrainSettings, agent_steps: int) -> str:
+    """Returns how long a run is that was told to take more steps, and what follows from it.
+
+    >>> longer_line(TrainSettings("gym", "CartPole-v1", learning_rate_end=0.0), 50_000)
+    'It takes 100,000 agent steps now; its learning rate is 0.0005 again, and falls to 0 by then.'
+    """
+    line = f"It takes {settings.agent_steps:,} agent steps now"
+    if settings.learning_rate_end is None:
+        return f"{line}."
+    rate = settings.learning_rate_at(agent_steps)
+    return (
+        f"{line}; its learning rate is {rate:.3g} again, and falls to "
+        f"{settings.learning_rate_end:.3g} by then."
+    )
+
+
+def best_line(path: Path, step: int, best: int | None) -> str:
+    """Returns where an earlier checkpoint had a better score than the last; empty if none had.
+
+    >>> best_line(Path("runs/pole"), 100, 80), best_line(Path("runs/pole"), 100, 100)
+    ('Its score was better at 80 agent steps: that checkpoint is kept as runs/pole@best.', '')
+    """
+    if best is None or best == step:
+        return ""
+    return (
+        f"Its score was better at {best:,} agent steps: that checkpoint is kept as "
+        f"{quote(str(path))}@best."
+    )
+
+
+def chance_line(agent: Evaluation, chance: Evaluation, cure: str) -> str:
+    """Returns a line that says so where an agent was not better than chance; else nothing.
+
+    Episodes that begin alike are compared, and the mean of the differences has an interval (95 %).
+
+    Args:
+        agent: how it did.
+        chance: how random actions did, in episodes from the same seeds.
+        cure: what may help.
+    """
+    differences = agent.returns - chance.returns
+    gained = bootstrap(differences, rng=np.random.default_rng(agent.seed))
+    if gained.low > 0.0:
+        return ""
+    mean = float(chance.returns.mean())
+    reached = f"random actions reach {_number(mean, _decimals(mean))} in as many episodes"
+    if gained.high < 0.0:
+        return f"It plays worse than chance: {reached}. {cure}"
+    return f"Nothing shows that it plays better than chance: {reached}. {cure}"
 
 
 def duration(seconds: float) -> str:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from hashlib import file_digest
 from pathlib import Path
 from typing import Any
@@ -59,7 +59,8 @@ class Run:
         blocks = state["memory"]["frames"].pop("sealed")
         state["run"] = {"seconds": self.seconds}
         self.metrics.sync()
-        save_checkpoint(self.folder, self.trainer.agent_steps, state, blocks)
+        step, score = self.trainer.agent_steps, self.trainer.scores.mean_return
+        save_checkpoint(self.folder, step, state, blocks, score=score)
 
 
 @contextmanager
@@ -86,20 +87,25 @@ def begin(settings: TrainSettings, path: Path | None = None) -> Iterator[Run]:
 
 
 @contextmanager
-def resume(path: Path, step: int | None = None) -> Iterator[Run]:
+def resume(path: Path, step: int | None = None, *, agent_steps: int | None = None) -> Iterator[Run]:
     """Picks up a run where its newest checkpoint stands, or at its beginning if there is none.
 
     Args:
         path: its folder.
         step: of an older checkpoint, in agent steps.
+        agent_steps: to take in all, if that is to be more than before. Only the learning rate
+            depends on it, where it is told to fall: from then on it is that of a run which was to
+            be so long from the beginning. Without that, the run becomes that run, to the bit.
 
     Raises:
-        InputError: there is no run, no such checkpoint, or its configuration has been changed.
+        InputError: there is no run, no such checkpoint, its configuration has been changed, or it
+            takes more steps than that already.
         NotImported: its environment needs a module that has not been imported.
         TrdlabError: another process holds it, or something is torn.
     """
     folder = RunFolder.open(path)
-    settings = run_settings(folder)
+    before = run_settings(folder)
+    settings = _longer(before, agent_steps)
     check_imported(settings.env)
     with ExitStack() as stack:
         stack.enter_context(folder.held())
@@ -110,6 +116,8 @@ def resume(path: Path, step: int | None = None) -> Iterator[Run]:
         else:
             _check_same_weights(folder, _given_weights(trainer))
             seconds, problem = 0.0, None
+        if settings != before:
+            folder = folder.extended(settings.agent_steps, trainer.agent_steps)
         metrics = stack.enter_context(MetricsFile(folder.metrics, trainer.agent_steps))
         yield Run(folder, trainer, metrics, memory, seconds, problem)
 
@@ -159,6 +167,18 @@ def carry_on(
     if saved != trainer.agent_steps:
         run.save()
     return trainer.done
+
+
+def _longer(settings: TrainSettings, agent_steps: int | None) -> TrainSettings:
+    """Returns settings for more agent steps, if there are to be more."""
+    if agent_steps is None:
+        return settings
+    if agent_steps < settings.agent_steps:
+        raise InputError(
+            f"`agent_steps` is {agent_steps}, and the run takes {settings.agent_steps} already.",
+            "Choose more: a run can become longer, and not shorter.",
+        )
+    return replace(settings, agent_steps=agent_steps)
 
 
 def _trainer(settings: TrainSettings, stack: ExitStack) -> tuple[Trainer, int]:

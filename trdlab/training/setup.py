@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trdlab.deep.presets import preset
+from trdlab.deep.presets import preset, preset_line
 from trdlab.deep.settings import Kind, TrainSettings, checked
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
@@ -42,16 +42,35 @@ def read_settings(
     """
     base, in_file = preset(kind, env, preset_name), {}
     if config is not None:
-        check_small_text(config)
-        lines = read_config(config)
+        lines = _lines_of(config)
         for key, here in (("kind", kind), ("env", env)):
             if lines.get(key, here) != here:
                 raise InputError(f"'{config}' is for another {key}.", f"Here it is '{here}'.")
-        if lines.keys() >= {"kind", "env"}:
+        if _is_complete(lines):
             base = TrainSettings(kind, env)
         in_file = checked(lines, f"'{config}'")
     # together, since one may only be in its range beside another
     return replace(base, **{**in_file, **checked(given, "The command")})
+
+
+def origin_line(kind: Kind, env: str, preset_name: str | None, config: Path | None) -> str:
+    """Returns where `read_settings` takes its settings from, and what may be expected of them.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    if config is not None and _is_complete(_lines_of(config)):
+        return f"Settings: those of '{config}'."
+    return preset_line(kind, env, preset_name)
+
+
+def _lines_of(config: Path) -> dict[str, Any]:
+    check_small_text(config)
+    return read_config(config)
+
+
+def _is_complete(lines: Mapping[str, Any]) -> bool:
+    return lines.keys() >= {"kind", "env"}
 
 
 def default_path(settings: TrainSettings) -> Path:

@@ -39,9 +39,9 @@ Plot = Annotated[Path | None, typer.Option("--plot", help="Write a picture: .png
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")]
 AGENT = (
     "A run's folder, RUN@STEP for an older checkpoint, RUN@best for that of the best score; the "
-    "folder of a fit; an exact table: gridworld:NAME, a map file, or tabular:ENV_ID, with arguments after "
-    "commas, such as gridworld:ledge,slip=0.2; or an agent of another library, as trdlab agent "
-    "reads it."
+    "folder of a fit; an exact table: gridworld:NAME, a map file, or tabular:ENV_ID, with "
+    "arguments after commas, such as gridworld:ledge,slip=0.2; or an agent of another library, as "
+    "trdlab agent reads it."
 )
 EnvArguments = Annotated[
     list[str] | None,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from trdlab.policies.protocol import Policy
     from trdlab.time_axis import TimeAxis
     from trdlab.training.loading import load
-    from trdlab.verbs import agent, calibrate, compare, explain, solve, train
+    from trdlab.verbs import agent, calibrate, compare, explain, fit, solve, train
 
 __version__ = "0.1.0"
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "calibrate",
     "compare",
     "explain",
+    "fit",
     "load",
     "solve",
     "train",

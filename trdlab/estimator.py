@@ -97,6 +97,38 @@ class Future:
         )
 
 
+class Unfitted:
+    """What stands for an estimator while nobody knows what an agent expects.
+
+    It can act, and be scored; whoever asks what it expects is told how to find out.
+
+    >>> Unfitted().time_axis
+    Traceback (most recent call last):
+    trdlab.errors.InputError: Nobody knows yet what this agent expects. Fit it first: \
+trdlab.fit(agent), or trdlab fit.
+    """
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """Nothing yet: raises `InputError`."""
+        raise self._unknown()
+
+    @property
+    def future(self) -> Future:
+        """Nothing yet: raises `InputError`."""
+        raise self._unknown()
+
+    def decompose(self, observations: Any) -> RewardDecomposition:
+        """Raises `InputError`: there is nothing to decompose yet."""
+        raise self._unknown()
+
+    def _unknown(self) -> InputError:
+        return InputError(
+            "Nobody knows yet what this agent expects.",
+            "Fit it first: trdlab.fit(agent), or trdlab fit.",
+        )
+
+
 @runtime_checkable
 class Estimator(Protocol):
     """Decomposes the future of a batch of observations."""

@@ -1,4 +1,4 @@
-"""The verbs of the package: solve, train or name an agent, then calibrate, explain, compare it."""
+"""The verbs of the package: solve, train, name or fit an agent; calibrate, explain, compare it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from trdlab.errors import InputError, closest
 
+OWN = "the agent's own policy"
+"""Whose future a fitted decomposition tells."""
+
 if TYPE_CHECKING:
     from trdlab.agents.agent import Agent
     from trdlab.agents.places import Where
+    from trdlab.deep.fit import FitProgress
     from trdlab.deep.settings import Kind
     from trdlab.deep.trainer import TrainMetrics
     from trdlab.explanations.calibration.report import CalibrationReport
@@ -37,9 +41,12 @@ def agent(
         what: a run's folder, `RUN@STEP` or `RUN@best` for another checkpoint; `gridworld:drone`, a
             map file or `tabular:FrozenLake-v1`, for the exact table of a model; a gridworld or
             another model; a table that is solved already; any `Estimator`, such as one of your own;
-            or an agent.
+            or an agent. Of others, who know nothing of their future until they are fitted: a file
+            of Stable-Baselines3 or CleanRL, a loaded model, a `Policy`, or a function from an
+            observation to an action's number, or from observations to probabilities.
         env: where it acts, if that is not where it was made for: a Gymnasium id, an environment, a
-            function that makes one, or a model or its name. An estimator of your own needs it.
+            function that makes one, or a model or its name. An estimator of your own needs it, and
+            so does an agent of others; that can also act in an Atari game.
         env_arguments: what to make the environment of an id with.
         gamma: γ of a model's table, by default 0.95. Whatever else has its own, as it has N and w.
         horizon: N of a model's table, by default 4.
@@ -176,6 +183,67 @@ def train(
         carry_on(run, on_metrics=on_metrics)
         path = run.folder.path
     return run_agent(path)
+
+
+def fit(
+    agent: Any,
+    env: "Where | None" = None,
+    *,
+    horizon: int = 40,
+    width: int = 1,
+    gamma: float | None = None,
+    steps: int = 100_000,
+    share: float = 0.1,
+    seed: int = 1,
+    tell: "Callable[[int | FitProgress], None]" = lambda progress: None,
+    **settings: Any,
+) -> "Agent":
+    """Learns what a frozen policy can expect, and returns the same agent that knows it.
+
+    The policy plays, with some of its actions forced, so that those it would not take are covered,
+    too. Then a network learns the reward that really came at each step. The policy stays as it is.
+
+    Args:
+        agent: whatever `trdlab.agent` takes.
+        env: where it acts, if that is not where it was made for.
+        horizon: N, the number of explicit components.
+        width: w, the steps in each.
+        gamma: γ; by default the agent's own, or 0.99.
+        steps: how many it plays, at least.
+        share: the chance that an action is forced.
+        seed: of everything.
+        tell: told of steps that were taken, and then of each look at the held-out error.
+        settings: else, as of `FitSettings`: `method`, `hidden`, `learning_rate`, …
+
+    Raises:
+        InputError: this is no agent, or a setting cannot be used.
+    """
+    from trdlab.deep.experience import gather
+    from trdlab.deep.fit import Fit, FitSettings
+    from trdlab.estimator import Future
+    from trdlab.policies import acting
+    from trdlab.rollouts.playing import usual_limit
+    from trdlab.time_axis import TimeAxis
+
+    frozen, chosen = _agent(agent, env), FitSettings(**{"seed": seed} | settings)
+    policy = acting(frozen.policy or frozen.estimator)
+    own = getattr(policy, "gamma", None) or frozen.estimator.time_axis.gamma
+    axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)
+    experience = gather(
+        frozen.make,
+        policy,
+        future,
+        steps=steps,
+        share=share,
+        pause=axis.num_steps if chosen.method == "regression" else 0,
+        num_envs=16 if frozen.world is None else 1_000,  # of a model they are cheap
+        max_steps=usual_limit(axis),
+        seed=seed,
+        tell=tell,
+    )
+    fitted = Fit(experience, frozen.interface.space, axis, chosen)
+    fitted.run(tell)
+    return replace(frozen, estimator=fitted.estimator(future), policy=policy)
 
 
 def calibrate(

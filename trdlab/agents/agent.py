@@ -12,10 +12,11 @@ from trdlab.agents.models import World
 from trdlab.agents.places import Origin, look
 from trdlab.environments.batches import Make, in_batches
 from trdlab.environments.interface import Interface
-from trdlab.estimator import Estimator
-from trdlab.policies import Policy
+from trdlab.estimator import Estimator, Unfitted
+from trdlab.policies import Likeliest, Policy, acting
 from trdlab.rollouts.branches import Copying
 from trdlab.rollouts.episodes import Episode, Recording, collect
+from trdlab.rollouts.evaluation import Evaluation, score
 from trdlab.rollouts.playing import Watch, part_of, unwatched
 
 
@@ -25,7 +26,7 @@ class Agent:
 
     Args:
         name: what people call it.
-        estimator: what it expects.
+        estimator: what it expects; `Unfitted` while nobody knows.
         action_names: A names.
         make: makes the environments that it acts in, from their number and a seed.
         policy: who acts, where that is not the estimator's greedy policy.
@@ -48,8 +49,15 @@ class Agent:
     copying: Copying = Copying()  # noqa: RUF009  it is frozen
 
     def __repr__(self) -> str:
-        axis, policy = self.estimator.time_axis, self.estimator.future.policy
-        return f"<Agent: {self.name} · {axis} · {policy} · {', '.join(self.action_names)}>"
+        told = "not fitted"
+        if self.is_fitted:
+            told = f"{self.estimator.time_axis} · {self.estimator.future.policy}"
+        return f"<Agent: {self.name} · {told} · {', '.join(self.action_names)}>"
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether it is known what it expects."""
+        return not isinstance(self.estimator, Unfitted)
 
     @cached_property
     def interface(self) -> Interface:
@@ -88,6 +96,30 @@ class Agent:
                 self.estimator, environments, policy=self.policy, seed=own, watch=tell, **how
             )
         return played
+
+    def evaluate(
+        self,
+        episodes: int = 20,
+        *,
+        greedy: bool = False,
+        max_steps: int | None = None,
+        seed: int = 0,
+        watch: Watch = unwatched,
+    ) -> Evaluation:
+        """Returns its score: the rewards of whole episodes, as the environment pays them.
+
+        It need not be known what it expects.
+
+        Args:
+            episodes: how many.
+            greedy: whether it takes its likeliest action, where it draws from probabilities.
+            max_steps: after which an episode is cut off, if not before.
+            seed: of the environments, and of the actions.
+            watch: told how far they are, after every step.
+        """
+        policy = acting(self.policy or self.estimator)
+        who = Likeliest(policy) if greedy else policy
+        return score(who, self.make, episodes, max_steps=max_steps, seed=seed, watch=watch)
 
     def action(self, name: str) -> str:
         """Returns the name of an action that is given by its name or its number."""

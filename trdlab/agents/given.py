@@ -11,11 +11,13 @@ import numpy as np
 from trdlab.agents.agent import Agent
 from trdlab.agents.exact import model_agent
 from trdlab.agents.models import Model, model_of
+from trdlab.agents.outside import policy_agent
 from trdlab.agents.places import Place, find_place, look
 from trdlab.environments.interface import Interface
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
+from trdlab.policies.registry import policy_of
 from trdlab.tabular import ExactTable
 from trdlab.time_axis import TimeAxis
 
@@ -32,7 +34,8 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
     Raises:
         InputError: it is no agent, or does not fit its environment.
     """
-    own = getattr(what.estimator if isinstance(what, Agent) else what, "time_axis", axis)
+    known = what.estimator if isinstance(what, Agent) and what.is_fitted else what
+    own = getattr(known, "time_axis", axis)
     place = None if env is None else find_place(env, env_arguments, own)
     if isinstance(what, Agent):
         return what if place is None else _moved(what, place)
@@ -46,16 +49,21 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
     if (model := model_of(what)) is not None:
         return model_agent(model, axis, place=place)
     missing = [name for name in ("decompose", "time_axis", "future") if not hasattr(what, name)]
-    if missing:
+    policy = policy_of(what) if missing else None
+    if missing and policy is None and not callable(what):
         raise InputError(
             f"This {type(what).__name__} is no agent: it has no {' and no '.join(missing)}.",
-            "Give a run's folder, gridworld:NAME, tabular:ENV_ID, a model, or an Estimator.",
+            "Give a run's folder, gridworld:NAME, tabular:ENV_ID, a model, an Estimator, a Policy, "
+            "a model of Stable-Baselines3, or a function.",
         )
     if place is None:
         raise InputError(
             f"Nothing says where this {type(what).__name__} acts.",
             "Give its environment: an id, an environment, or a function that makes one.",
         )
+    if missing:
+        called = getattr(what, "__name__", type(what).__name__)
+        return policy_agent(policy or what, place, called.strip("<>"))
     return _estimating(what, place)
 
 

@@ -11,6 +11,7 @@ from trdlab.environments.naming import numbered
 from trdlab.errors import InputError, closest
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.env import GridworldEnv
+from trdlab.policies.files import is_text
 from trdlab.tabular import MDP
 from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.named import TabularWorld
@@ -66,7 +67,7 @@ def is_model(name: str) -> bool:
         return True
     path = Path(name.partition(",")[0])
     try:
-        return path.is_file()
+        return path.is_file() and is_text(path)
     except OSError as error:
         short = name if len(name) <= _LONG else f"{name[:_LONG]}…"
         raise InputError(

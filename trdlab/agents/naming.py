@@ -1,19 +1,23 @@
 """What a word names: a run, a checkpoint of it, or the exact table of a model."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from trdlab.agents.agent import Agent
 from trdlab.agents.exact import exact_agent
 from trdlab.agents.models import GRIDWORLD, TABULAR, is_model
-from trdlab.agents.places import AXIS, Where, changed
+from trdlab.agents.outside import file_agent
+from trdlab.agents.places import AXIS, Origin, Where, changed
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
+from trdlab.policies.functions import PYTHON, from_python
 from trdlab.tabular.toytext import toy_text_ids
+from trdlab.time_axis import TimeAxis
 
 _OWN_AXIS = "is a run with its own γ, N and w."
+_UNKNOWN_AXIS = "gets γ, N and w when it is fitted."
 _LEAVE_OUT = "Leave out `gamma`, `horizon` and `width`."
 
 
@@ -31,7 +35,8 @@ def find_agent(
     That is a run's folder, or `RUN@STEP` for an older checkpoint of it, or `RUN@best` for the one
     of the best score; or, for the exact table of a model, `gridworld:NAME`, a map file, or
     `tabular:ENV_ID`, each with what to make it with after commas, such as
-    `gridworld:ledge,slip=0.2`.
+    `gridworld:ledge,slip=0.2`; or a file of an agent that another library trained, or
+    `python:FILE.py:FUNCTION`, whose function makes one.
 
     Args:
         name: of the agent.
@@ -45,18 +50,35 @@ def find_agent(
         InputError: there is no such agent, or something does not fit it.
         TrdlabError: a run is torn.
     """
+    where: dict[str, Any] = {"env": env, "env_arguments": env_arguments}
+    if name.startswith(PYTHON):
+        return _made(name, env, env_arguments, changed(AXIS, gamma, horizon, width))
     if is_model(name):
         called = name if name.startswith((GRIDWORLD, TABULAR)) else f"{GRIDWORLD}{name}"
         axis = changed(AXIS, gamma, horizon, width)
-        return exact_agent(called, axis, env=env, env_arguments=env_arguments)
+        return exact_agent(called, axis, **where)
     _refuse_model(name)
+    is_file = Path(name.partition(",")[0]).is_file()
     if (gamma, horizon, width) != (None, None, None):
-        raise InputError(f"'{name}' {_OWN_AXIS}", _LEAVE_OUT)
+        own = _UNKNOWN_AXIS if is_file else _OWN_AXIS
+        raise InputError(f"'{name}' {own}", _LEAVE_OUT)
+    if is_file:
+        return file_agent(name, **where)
     from trdlab.agents.runs import run_agent
     from trdlab.runs import find_checkpoint
 
     path, step = find_checkpoint(name)
-    return run_agent(path, step=step, env=env, env_arguments=env_arguments)
+    return run_agent(path, step=step, **where)
+
+
+def _made(name: str, env: Where | None, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:
+    """Returns the agent that a function in a file of Python makes."""
+    from trdlab.agents.given import agent_of
+
+    made = agent_of(from_python(name.removeprefix(PYTHON)), env, env_arguments, axis)
+    if not isinstance(env, str):
+        return made
+    return replace(made, origin=Origin(name, env, tuple(env_arguments), None, away=True))
 
 
 def _refuse_model(name: str) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Self
 
+import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 
@@ -116,8 +117,8 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
 
     Args:
         env: `gridworld:NAME`, a map file, or `tabular:ENV_ID`, with arguments after commas; the id
-            of a Gymnasium environment; an environment, or a function that makes one; or a model.
-            An environment is acted in even where it carries a model.
+            of a Gymnasium environment; an Atari game; an environment, or a function that makes one;
+            or a model. An environment is acted in even where it carries a model.
         env_arguments: what to make one of an id with, as `KEY=VALUE`.
         time_axis: of the agent; episodes of a model without a limit last four horizons or longer.
 
@@ -134,6 +135,8 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
         called = str(env) if named else model.name
         return Place(make, called, is_named=named, mdp=model.world.mdp)
     source: Any = env
+    if named and (game := _game(source)) is not None:
+        return Place(_games(game, env_arguments), source, tuple(env_arguments))
     arguments = parse_arguments(env_arguments)
 
     def made(num_envs: int, seed: int) -> GymEnvironments:
@@ -141,6 +144,27 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
 
     called = str(env) if named else "the environment"
     return Place(made, called, tuple(env_arguments), named, _mdp_of(env))
+
+
+def _games(game: str, env_arguments: Sequence[str]) -> Make:
+    """Returns what makes games of Atari, as runs play them."""
+    from trdlab.deep.settings import TrainSettings
+    from trdlab.training.setup import make_environments
+
+    there = TrainSettings("atari", game, env_arg=tuple(env_arguments))
+    return lambda num_envs, seed: make_environments(there, num_envs=num_envs, seed=seed)
+
+
+def _game(env: str) -> str | None:
+    """Returns the Atari game that a word names; None where Gymnasium has an environment for it."""
+    if ":" in env or (env in gym.registry and not env.startswith("ALE/")):
+        return None
+    from trdlab.atari.names import find_game
+
+    try:
+        return find_game(env)
+    except InputError:
+        return None
 
 
 def _mdp_of(env: Any) -> MDP | None:

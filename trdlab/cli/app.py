@@ -14,6 +14,7 @@ COMMANDS = {
     "tabular": "trdlab.cli.tabular",
     "explain": "trdlab.cli.explain",
     "compare": "trdlab.cli.compare",
+    "agent": "trdlab.cli.agent",
     "train": "trdlab.cli.train",
     "resume": "trdlab.cli.train",
     "evaluate": "trdlab.cli.train",

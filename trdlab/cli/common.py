@@ -40,7 +40,7 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the pictur
 AGENT = (
     "A run's folder, RUN@STEP for an older checkpoint, RUN@best for that of the best score; or an "
     "exact table: gridworld:NAME, a map file, or tabular:ENV_ID, with arguments after commas, such "
-    "as gridworld:ledge,slip=0.2."
+    "as gridworld:ledge,slip=0.2; or an agent of another library, as trdlab agent reads it."
 )
 EnvArguments = Annotated[
     list[str] | None,

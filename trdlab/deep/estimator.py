@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.deep.networks import DecompositionNetwork
 from trdlab.errors import InputError
@@ -24,6 +25,8 @@ class NetworkEstimator:
         future: whose future it was trained to tell.
         device: where it computes.
         batch_size: the most observations in one forward pass.
+        possible: `[2, N+1]`, the least and the most that a component can be, if that is known; what
+            the network tells beyond is cut to it.
 
     Raises:
         InputError: the network has another number of components, or `batch_size` is below 1.
@@ -34,6 +37,7 @@ class NetworkEstimator:
     future: Future
     device: torch.device | str = "cpu"
     batch_size: int = 256
+    possible: FloatArray | None = None
 
     def __post_init__(self) -> None:
         ours, theirs = self.time_axis.num_components, self.network.num_components
@@ -79,4 +83,6 @@ class NetworkEstimator:
         finally:
             self.network.train(was_training)
         components = torch.cat(parts).numpy()  # [B, A, N+1]
+        if self.possible is not None:
+            components = np.clip(components, *self.possible.astype(components.dtype))
         return RewardDecomposition(components, self.time_axis)

@@ -1,7 +1,7 @@
 """Policies made of what there is: of an estimator, of a function, of another policy."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.policies.protocol import Policy
+from trdlab.policies.protocol import Policy, ask
 
 Who = Policy | Estimator | Callable[[Any], FloatArray]
 """Who can act: by itself, greedily, or by a function to action probabilities."""
@@ -82,6 +82,28 @@ class EpsilonGreedy:
         probabilities, state = self.policy.act(observations, state, begins)
         evenly = self.epsilon / probabilities.shape[1]
         return (1.0 - self.epsilon) * probabilities + evenly, state
+
+
+@dataclass(frozen=True)
+class Likeliest:
+    """Takes the action that another policy is likeliest to take, of equals the first.
+
+    Args:
+        policy: the other one.
+    """
+
+    policy: Policy
+
+    @property
+    def about(self) -> Any:
+        """What is known about the other one (`About`), if anything is."""
+        about = getattr(self.policy, "about", None)
+        return about and replace(about, draws=False)
+
+    def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
+        """Returns 1 for that action `[B, A]`, and what the other policy remembers."""
+        probabilities, state = ask(self.policy, observations, state, begins)
+        return greedy(probabilities), state
 
 
 def acting(who: Who) -> Policy:

@@ -7,11 +7,15 @@ from typing import Any
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.environments import Environments
+from trdlab.environments import Environments, in_batches
+from trdlab.environments.batches import Make
+from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.policies import Policy, acting
-from trdlab.rollouts.playing import Playing, Watch, unwatched
+from trdlab.rollouts.playing import Playing, Watch, part_of, unwatched
 from trdlab.statistics import Estimate, bootstrap, interquartile_mean
+
+_ENOUGH = 1_000  # steps of an episode that nothing else cuts off
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +106,40 @@ def evaluate(
         truncated |= playing.finished & ~step.terminated
         watch(playing.progress("episodes to score"))
     return Evaluation(returns, lengths, truncated, epsilon, seed, max_steps)
+
+
+def score(
+    who: Policy | Estimator,
+    make: Make,
+    episodes: int,
+    *,
+    max_steps: int | None = None,
+    seed: int = 0,
+    watch: Watch = unwatched,
+) -> Evaluation:
+    """Plays episodes beside each other, or one after another where there can be no more at a time.
+
+    Args:
+        who: plays; an estimator by its greedy policy.
+        make: makes the environments.
+        episodes: how many.
+        max_steps: after which an episode is cut off; by default the environment's own limit, or
+            1,000 where it has none.
+        seed: of everything.
+        watch: told how far the episodes are, after every step.
+
+    Raises:
+        InputError: the environments cannot be made, or there is not a single episode or step.
+    """
+    if episodes < 1:
+        raise InputError(f"There are {episodes} episodes.", "Ask for at least 1.")
+    parts: list[Evaluation] = []
+    for environments in in_batches(make, episodes, seed):
+        limit = max_steps or (None if environments.time_limit else _ENOUGH)
+        told = part_of(watch, sum(len(of.returns) for of in parts), episodes)
+        own = seed + len(parts)  # a single batch, where there can be one
+        parts.append(evaluate(who, environments, max_steps=limit, seed=own, watch=told))
+    return joined(parts)
 
 
 def joined(parts: Sequence[Evaluation]) -> Evaluation:

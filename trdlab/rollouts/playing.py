@@ -194,11 +194,15 @@ class Playing:
     def at_last(self) -> Decision:
         """Returns what is expected at the true last observations of the finished episodes."""
         told = self._told(self._last)
+        return Decision(told, self.last_seen()[1] if self._policy else greedy(told.value))
+
+    def last_seen(self) -> tuple[Any, FloatArray]:
+        """Returns the true last observations, and how likely the policy takes each action there."""
         if self._policy is None:
-            return Decision(told, greedy(told.value))
+            raise TypeError("Nobody was given who acts.")
         memory = rows(self._memory, self.finished[self._asked])
         nowhere = np.zeros(len(self._last), dtype=np.bool_)
-        return Decision(told, ask(self._policy, self._last, memory, nowhere)[0])
+        return self._last, ask(self._policy, self._last, memory, nowhere)[0]
 
     def branch(self, which: IntArray, *, rng: np.random.Generator, max_steps: int) -> "Playing":
         """Returns copies of episodes at this step, with what their policy remembers of it.

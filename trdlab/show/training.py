@@ -33,8 +33,16 @@ def plan_page(plan: Plan, origin: str = "") -> Text:
     return Text("\n".join(lines))
 
 
-def evaluation_page(evaluation: Evaluation, *, width: int | None = None) -> Text:
-    """Returns what an agent reached: means, intervals if episodes differ, and how they ended."""
+def evaluation_page(
+    evaluation: Evaluation, *, how: str = "greedy", width: int | None = None
+) -> Text:
+    """Returns what an agent reached: means, intervals if episodes differ, and how they ended.
+
+    Args:
+        evaluation: its episodes.
+        how: it chose its actions.
+        width: of the page; by default that of the terminal.
+    """
     low, high = float(evaluation.returns.min()), float(evaluation.returns.max())
     decimals = _decimals(low, high)
 
@@ -51,7 +59,7 @@ def evaluation_page(evaluation: Evaluation, *, width: int | None = None) -> Text
     table, width = Table(("", "", ""), rows, "<<<"), width or columns()
     random = f", {evaluation.epsilon:.1%} random actions" if evaluation.epsilon else ""
     count = counted(len(evaluation.returns), "episode")
-    head = f"{count}, greedy{random}, seed {evaluation.seed}"
+    head = f"{count}, {how}{random}, seed {evaluation.seed}"
     lines = wrapped(f"{head}; raw rewards, undiscounted", width)
     return Text("\n").join([*lines, *table_lines(table, width)])
 

@@ -11,10 +11,10 @@ from typing import Any
 from trdlab.deep.board import board, check_board
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
-from trdlab.deep.weights import read_weights
 from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
 from trdlab.errors import InputError, OutputError, TrdlabError
+from trdlab.policies.weights import read_weights
 from trdlab.runs import (
     MetricsFile,
     RunFolder,

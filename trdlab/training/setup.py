@@ -166,7 +166,7 @@ def plan(settings: TrainSettings) -> Plan:
         TrdlabError: the run does not fit into what is free.
     """
     from trdlab.deep.memory import available_memory
-    from trdlab.deep.weights import read_weights
+    from trdlab.policies.weights import read_weights
 
     check_threads(settings)
     environments = make_environments(settings)

@@ -68,10 +68,10 @@ def test_each_surprise_has_its_reason():
         place(claim): claim.sentence for claim in tell(changed).moments if "gap" in claim.fields
     }
     assert turns == {
-        0: "At step 0, wait turned out 0.125 better than expected, mainly because what is to come "
-        "after step 3 went from 0 to 0.125.",
-        1: "At step 1, wait turned out 0.25 worse than expected, mainly because what is to come at "
-        "step 4 went from 0.25 to 0.",
+        0: "At step 0, wait turned out 0.125 better than expected, mainly because what it "
+        "expects to come after step 3 went from 0 to 0.125.",
+        1: "At step 1, wait turned out 0.25 worse than expected, mainly because what it "
+        "expects to come at step 4 went from 0.25 to 0.",
     }
     more = played(foretold([0.0, 0.5]), [0.0, 2.0])
     assert said(tell(more).moments) == [

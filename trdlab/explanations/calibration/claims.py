@@ -87,7 +87,7 @@ _FEW = "For {span:comes}, {whose:text} were tested in {few:text}"
 def judged(report: CalibrationReport) -> Found:
     cut = "episodes were cut off before" if report.judged.truncated else "no episode shows it"
     unseen = (
-        "by then, the test had always taken a random action" if report.judged.epsilon > 0.0 else cut
+        "by then, each test episode had a random action" if report.judged.epsilon > 0.0 else cut
     )
     yield from _verdicts(OWN, report.calibration, unseen)
     if report.foils is not None:

@@ -23,8 +23,8 @@ _SAYS = {
     ),
     "no-reward": f"{_TURNED}, mainly because nothing came where {{expected:number}} was expected.",
     "other-belief": (  # of a later component
-        f"{_TURNED}, mainly because what is to come {{place:at}} went from {{was:number}} to "
-        "{now:number}."
+        f"{_TURNED}, mainly because what it expects to come {{place:at}} went from {{was:number}} "
+        "to {now:number}."
     ),
     "spread-out": (  # half of what speaks for the outcome lies at a step or before
         f"{_TURNED}, spread over many steps: half of it up to {{by:step}}."

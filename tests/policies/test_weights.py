@@ -12,8 +12,8 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from trdlab.deep.weights import read_weights
 from trdlab.errors import InputError
+from trdlab.policies.weights import read_weights
 
 WEIGHTS = {"head.weight": torch.arange(6.0).reshape(2, 3), "steps": torch.tensor(7)}
 

@@ -3,7 +3,8 @@
 import pickle
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -23,55 +24,88 @@ def read_weights(path: str | Path) -> dict[str, npt.NDArray[Any]]:
     """Returns the weights that a file holds, by name; floating-point ones as float32.
 
     Args:
-        path: a `.safetensors` file, or a state dict as `torch.save` writes it; also a mapping that
+        path: a safetensors file, or a state dict as `torch.save` writes it; also a mapping that
             has a state dict under `state_dict`, `model_state_dict`, `q_network`, `network`,
-            `model` or `weights`.
+            `model` or `weights`. What it is follows from what it holds, not from its name.
 
     Raises:
         InputError: it cannot be read, or holds anything else, or what is no finite number. A
             pickle with code is refused, and the code is not executed.
     """
     path = Path(path)
+    return weights_in(lambda: load_file(path) if _is_safetensors(path) else _unpickled(path), path)
+
+
+def read_part(part: bytes, called: str) -> dict[str, npt.NDArray[Any]]:
+    """Returns the weights that a part of a larger file holds, as `read_weights` does.
+
+    Args:
+        part: what `torch.save` wrote.
+        called: how messages name it.
+
+    Raises:
+        InputError: likewise.
+    """
+    return weights_in(lambda: _unpickled(BytesIO(part)), called)
+
+
+def weights_in(read: Callable[[], Any], called: str | Path) -> dict[str, npt.NDArray[Any]]:
+    """Returns the weights in what is read, by name.
+
+    Args:
+        read: reads it.
+        called: how messages name it.
+
+    Raises:
+        InputError: see `read_weights`.
+    """
     try:
-        held = load_file(path) if path.suffix == ".safetensors" else _unpickled(path)
+        held = read()
     except OSError as error:
         reason = error.strerror or error
-        raise InputError(f"'{path}' cannot be read: {reason}.", "Name another file.") from error
+        raise InputError(f"'{called}' cannot be read: {reason}.", "Name another file.") from error
     except pickle.UnpicklingError as error:  # its own text advises to execute the file
         code = re.search(r"GLOBAL ([\w.]+)", str(error))
         raise InputError(
-            f"'{path}' holds code{f' ({code[1]})' if code else ''}, or is no file of weights.",
+            f"'{called}' holds code{f' ({code[1]})' if code else ''}, or is no file of weights.",
             "Nothing was executed. Give the weights alone: torch.save(network.state_dict(), …).",
         ) from error
     except (SafetensorError, RuntimeError, EOFError, LookupError, ValueError) as error:
         raise InputError(
-            f"'{path}' is torn, or holds no weights.", "Name a .safetensors file or a state dict."
+            f"'{called}' is torn, or holds no weights.",
+            "Name a safetensors file or a state dict.",
         ) from error
-    weights = {name: _array(weight) for name, weight in _state_dict(held, path).items()}
+    weights = {name: _array(weight) for name, weight in _state_dict(held, called).items()}
     for name, weight in weights.items():
         finite = np.isfinite(weight)
         if not finite.all():
             raise InputError(
-                f"'{path}' has {weight[~finite][0]} in '{name}'.", "Name other weights."
+                f"'{called}' has {weight[~finite][0]} in '{name}'.", "Name other weights."
             )
     return weights
 
 
-def _unpickled(path: Path) -> Any:
+def _is_safetensors(path: Path) -> bool:
+    """Returns whether a file begins as safetensors do: a length, and then a header in JSON."""
+    with path.open("rb") as file:
+        return file.read(9)[8:] == b"{"
+
+
+def _unpickled(file: Path | BytesIO) -> Any:
     """Returns what `torch.save` wrote, if it consists of tensors and plain values."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of pickles that torch has not written
-        return torch.load(path, map_location="cpu", weights_only=True)
+        return torch.load(file, map_location="cpu", weights_only=True)
 
 
-def _state_dict(held: Any, path: Path) -> Mapping[str, Tensor]:
+def _state_dict(held: Any, called: str | Path) -> Mapping[str, Tensor]:
     """Returns the weights by name, wherever they stand in what a file holds."""
     inner = [held.get(key) for key in _HELD_UNDER] if isinstance(held, Mapping) else []
     for found in (held, *inner):
         if isinstance(found, Mapping) and found and all(map(_is_weight, found.items())):
             return found
     raise InputError(
-        f"'{path}' holds no weights by name.", "Give a state dict: names and tensors, no more."
+        f"'{called}' holds no weights by name.", "Give a state dict: names and tensors, no more."
     )
 
 

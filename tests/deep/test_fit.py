@@ -1,0 +1,209 @@
+"""A frozen policy's decomposition, fitted to what it did, against answers that are exact."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import trdlab
+from trdlab.bellman import target as law
+from trdlab.deep.experience import Ahead, Experience, gather
+from trdlab.deep.fit import Fit, FitSettings
+from trdlab.errors import InputError
+from trdlab.estimator import Future
+from trdlab.policies import Memoryless
+from trdlab.tabular import MDP, exact
+from trdlab.tabular.episodes import ModelEnvironments
+from trdlab.time_axis import TimeAxis
+
+FUTURE = Future("the agent's own policy")
+FAR = 1_000
+
+
+def experience(rewards: list[float], until: list[int], *, ended: bool = True) -> Experience:
+    """One episode of the numbered states 0, 1, …; the last row is what was seen after it."""
+    count = len(rewards) + 1
+    ends = np.zeros(count, dtype=np.bool_)
+    ends[count - 2] = ended
+    return Experience(
+        observations=np.arange(count),
+        probabilities=np.full((count, 2), 0.5),
+        actions=np.zeros(count, dtype=np.int64),
+        rewards=np.array([*rewards, 0.0]),
+        ends=ends,
+        until=np.array([*until, FAR]),
+        last=np.full(count, count - 1),
+    )
+
+
+# ---- what followed a step ------------------------------------------------------------------------
+
+
+def test_what_came_is_known_as_far_as_the_policy_acted():
+    axis = TimeAxis(0.5, 3)
+    of = experience([1.0, 2.0, 4.0, 8.0], until=[2, 2, FAR, FAR])  # at step 2 it was forced
+    ahead = of.ahead(np.array([0, 1, 2]), axis)
+    assert ahead.rewards.tolist() == [[1.0, 1.0, 0.0], [2.0, 0.0, 0.0], [4.0, 4.0, 0.0]]
+    assert ahead.span.tolist() == [2, 1, 3]
+    assert ahead.over.tolist() == [False, False, True]
+    assert ahead.follows.tolist() == [2, 2, 4]
+    known = [[True, True, False], [True, False, False], [True, True, True]]
+    assert ahead.known(axis).tolist() == known
+
+
+def test_what_would_have_been_forced_after_the_end_is_not_known_either():
+    """Else episodes that ended would count, and those that went on until then would not."""
+    axis = TimeAxis(0.5, 3)
+    ahead = experience([1.0], until=[2]).ahead(np.array([0]), axis)
+    assert ahead.over.tolist() == [True]
+    assert ahead.known(axis).tolist() == [[True, True, False]]
+    nothing = ahead.target(axis, np.full((1, 4), 7.0))
+    assert nothing.tolist() == [[1.0, 0.0, 0.0, 0.0]], "nothing is to come after an end"
+
+
+def test_a_cut_episode_goes_on_in_what_is_expected():
+    axis = TimeAxis(0.5, 2)
+    ahead = experience([1.0], until=[FAR], ended=False).ahead(np.array([0]), axis)
+    assert (ahead.span[0], ahead.follows[0], ahead.over[0]) == (1, 1, False)
+    assert ahead.target(axis, np.array([[2.0, 4.0, 6.0]])).tolist() == [[1.0, 1.0, 5.0]]
+
+
+def test_groups_are_known_as_a_whole_or_not():
+    axis = TimeAxis(0.5, 2, 2)
+    of = experience([1.0, 2.0, 4.0, 8.0, 16.0], until=[3, 3, FAR, FAR, FAR])
+    ahead = of.ahead(np.array([0, 2]), axis)
+    assert ahead.span.tolist() == [1, 2]
+    assert ahead.rewards.tolist() == [[2.0, 0.0], [8.0, 4.0]]
+    assert ahead.known(axis).tolist() == [[True, False], [True, True]]
+
+
+def test_without_components_it_is_the_target_of_a_value():
+    axis = TimeAxis(0.5, 0)
+    ahead = experience([1.0, 2.0], until=[FAR, FAR]).ahead(np.array([0, 1]), axis)
+    assert ahead.target(axis, np.array([[8.0], [8.0]])).tolist() == [[5.0], [2.0]]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 5), st.integers(1, 5), st.floats(0.1, 0.99), st.integers(0, 2**32))
+def test_a_target_is_the_law_applied_as_often_as_rewards_are_known(horizon, span, gamma, seed):
+    axis, rng = TimeAxis(gamma, horizon), np.random.default_rng(seed)
+    span = min(span, horizon)
+    paid, following = rng.normal(size=span), rng.normal(size=(1, horizon + 1))
+    by_law = following
+    for reward in paid[::-1]:
+        by_law = law(np.array([reward]), np.array([gamma]), by_law)
+    rewards = np.zeros((1, horizon))
+    rewards[0, :span] = paid * gamma ** np.arange(span)
+    one = np.array([span])
+    ahead = Ahead(rewards, one, np.array([False]), one, one)
+    np.testing.assert_allclose(ahead.target(axis, following), by_law, rtol=1e-9, atol=1e-12)
+
+
+# ---- playing -------------------------------------------------------------------------------------
+
+
+def walk() -> MDP:
+    """Four places in a row: on to the next or back; the last pays 1 and ends, the first costs."""
+    return MDP.from_transitions(
+        [
+            [[(1.0, 0, -0.2, False)], [(0.8, 1, 0.0, False), (0.2, 0, 0.0, False)]],
+            [[(1.0, 0, 0.0, False)], [(0.8, 2, 0.0, False), (0.2, 1, 0.5, False)]],
+            [[(1.0, 1, 0.0, False)], [(0.7, 3, 1.0, True), (0.3, 0, 0.0, False)]],
+            [[(1.0, 3, 0.0, True)], [(1.0, 3, 0.0, True)]],
+        ]
+    )
+
+
+POLICY = np.array([[0.3, 0.7], [0.0, 1.0], [0.5, 0.5], [1.0, 0.0]])  # from place 1 never back
+
+
+def played(*, steps: int = 40_000, share: float = 0.2, pause: int = 0, seed: int = 0) -> Experience:
+    starts = np.array([0.4, 0.3, 0.3, 0.0])
+
+    def make(count: int, own: int) -> ModelEnvironments:
+        return ModelEnvironments(walk(), count, seed=own, starts=starts, time_limit=200)
+
+    policy = Memoryless(lambda states: POLICY[states])
+    how = {"steps": steps, "share": share, "pause": pause, "num_envs": 500, "seed": seed}
+    return gather(make, policy, FUTURE, **how)  # type: ignore[arg-type]
+
+
+def test_actions_are_forced_as_often_as_asked_for_and_cover_what_the_policy_never_does():
+    of = played(steps=20_000)
+    at_one = of.steps[of.observations[of.steps] == 1]
+    back = (of.actions[at_one] == 0).mean()
+    assert 0.08 < back < 0.12, "a fifth is forced, half of that goes back"
+    assert (of.last[of.steps] > of.steps).all()
+    assert of.ends[of.last - 1].mean() > 0.99, "nearly all came to an end"
+    paused = played(steps=20_000, share=1.0, pause=9)
+    gaps = np.minimum(paused.until, paused.last)[paused.steps] - paused.steps
+    assert gaps.max() <= 10, "each tenth action is forced"
+
+
+def test_the_same_seed_plays_the_same():
+    one, other = played(steps=2_000), played(steps=2_000)
+    assert one.actions.tobytes() == other.actions.tobytes()
+    assert one.until.tobytes() == other.until.tobytes()
+
+
+@pytest.mark.parametrize(("steps", "share"), [(0, 0.1), (10, 1.5)])
+def test_what_cannot_be_played_is_refused(steps: int, share: float):
+    with pytest.raises(InputError, match=r"Ask for at least 1 step, and a share from 0 to 1\."):
+        played(steps=steps, share=share)
+
+
+# ---- learning ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", [1, 2])
+@pytest.mark.parametrize("method", ["mixed", "regression", "td"])
+def test_each_method_finds_the_exact_components_of_actions_it_never_takes_too(method, width):
+    axis = TimeAxis(0.9, 4, width)
+    of = played(steps=100_000, pause=axis.num_steps if method == "regression" else 0)
+    how = FitSettings(method, learning_rate=0.01, batch_size=1024, most_updates=4_000)
+    fit = Fit(of, gym.spaces.Discrete(4), axis, how)
+    fit.run()
+    told = fit.estimator(FUTURE).decompose(np.arange(3)).components
+    true = exact(walk(), axis, policy=POLICY)
+    largest = np.abs(true.solution.q_values).max()
+    np.testing.assert_allclose(told, true.decomposition.components[:3], atol=0.03 * largest)
+
+
+def test_the_same_seed_learns_the_same_bits():
+    def weights() -> bytes:
+        fit = Fit(played(steps=3_000), gym.spaces.Discrete(4), TimeAxis(0.9, 3))
+        for _ in range(20):
+            fit.update()
+        return fit.estimator(FUTURE).network.head.weight.detach().numpy().tobytes()
+
+    assert weights() == weights()
+
+
+def test_nothing_is_told_that_no_reward_allows():
+    fit = Fit(played(steps=3_000), gym.spaces.Discrete(4), TimeAxis(0.9, 2))
+    with torch.no_grad():
+        fit.network.head.bias += 100.0
+    told = fit.estimator(FUTURE).decompose(np.arange(4)).components
+    most = [1.0, 0.9, 0.81 / 0.1]  # if every step paid 1, the most that one did
+    np.testing.assert_allclose(told.max(axis=(0, 1)), most, rtol=1e-6)
+
+
+def test_wrong_settings_are_refused():
+    with pytest.raises(InputError, match=r"no method 'regresion'\. Did you mean 'regression'\?"):
+        FitSettings("regresion")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"A share of 1\.0 is held out"):
+        FitSettings(held_out=1.0)
+    with pytest.raises(InputError, match=r"There is a single episode\. Play more steps\."):
+        Fit(experience([1.0], [FAR]), gym.spaces.Discrete(2), TimeAxis(0.9, 2))
+
+
+def test_a_fitted_agent_acts_as_before_and_is_explained():
+    agent = trdlab.solve("ledge", gamma=0.9, horizon=2)
+    fitted = trdlab.fit(agent, horizon=3, steps=20_000, most_updates=600, learning_rate=0.01)
+    assert fitted.policy is agent.policy
+    assert fitted.estimator.time_axis == TimeAxis(0.9, 3), "γ is the agent's own"
+    assert fitted.estimator.future.policy == "the agent's own policy"
+    page = str(trdlab.explain(fitted, episodes=20))
+    assert "ledge · step 0 of the episode with seed 0" in page

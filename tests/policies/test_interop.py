@@ -1,0 +1,191 @@
+"""Archives and loaded models act as the libraries that made them say: the same to the last action.
+
+Needs the extra `interop`; without it these tests are skipped.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.filterwarnings("ignore")  # of those libraries
+sb3 = pytest.importorskip("stable_baselines3", reason="needs pip install 'trdlab[interop]'")
+contrib = pytest.importorskip("sb3_contrib", reason="needs pip install 'trdlab[interop]'")
+
+import torch  # noqa: E402
+
+import trdlab  # noqa: E402
+from trdlab.policies import ask  # noqa: E402
+from trdlab.policies.files import Options, open_agent  # noqa: E402
+from trdlab.policies.live import adapt as adapt_live  # noqa: E402
+from trdlab.policies.registry import read_policy  # noqa: E402
+
+
+class Seen(gym.Env):
+    """Shows whatever is drawn from its space."""
+
+    def __init__(self, space: gym.Space[Any]) -> None:
+        self.observation_space, self.action_space = space, gym.spaces.Discrete(3)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self.observation_space.sample(), {}
+
+    def step(self, action):
+        return self.observation_space.sample(), 1.0, False, False, {}
+
+    def action_masks(self):
+        return [True] * 3
+
+
+VECTOR = gym.spaces.Box(-3, 3, (5,))
+IMAGE = gym.spaces.Box(0, 255, (40, 44, 3), np.uint8)
+BOARD = gym.spaces.Box(-3, 3, (2, 3))
+STATES = gym.spaces.Discrete(7)
+RELU = {"activation_fn": torch.nn.ReLU, "net_arch": [8]}
+OFF_POLICY = {"buffer_size": 10, "learning_starts": 1}
+LSTM = {"lstm_hidden_size": 8}
+CASES = {
+    "DQN": (sb3.DQN, "MlpPolicy", VECTOR, OFF_POLICY),
+    "DQN of a board": (sb3.DQN, "MlpPolicy", BOARD, OFF_POLICY),
+    "DQN of states": (sb3.DQN, "MlpPolicy", STATES, OFF_POLICY),
+    "DQN of images": (sb3.DQN, "CnnPolicy", IMAGE, OFF_POLICY),
+    "DQN, tanh": (
+        sb3.DQN, "MlpPolicy", VECTOR,
+        OFF_POLICY | {"policy_kwargs": {"activation_fn": torch.nn.Tanh}},
+    ),
+    "QR-DQN": (
+        contrib.QRDQN, "MlpPolicy", VECTOR, OFF_POLICY | {"policy_kwargs": {"n_quantiles": 5}}
+    ),
+    "QR-DQN of images": (
+        contrib.QRDQN, "CnnPolicy", IMAGE, OFF_POLICY | {"policy_kwargs": {"n_quantiles": 5}}
+    ),
+    "PPO": (sb3.PPO, "MlpPolicy", VECTOR, {}),
+    "PPO of states": (sb3.PPO, "MlpPolicy", STATES, {}),
+    "PPO of images": (sb3.PPO, "CnnPolicy", IMAGE, {}),
+    "PPO of images, flat": (sb3.PPO, "MlpPolicy", IMAGE, {"policy_kwargs": {"net_arch": [4]}}),
+    "PPO of images, not shared": (
+        sb3.PPO, "CnnPolicy", IMAGE,
+        {"policy_kwargs": {"share_features_extractor": False, "normalize_images": False}},
+    ),
+    "PPO, relu": (sb3.PPO, "MlpPolicy", VECTOR, {"policy_kwargs": RELU}),
+    "PPO, linear": (sb3.PPO, "MlpPolicy", VECTOR, {"policy_kwargs": {"net_arch": []}}),
+    "PPO, uneven": (
+        sb3.PPO, "MlpPolicy", VECTOR, {"policy_kwargs": {"net_arch": {"pi": [8], "vf": [4, 4]}}}
+    ),
+    "A2C": (sb3.A2C, "MlpPolicy", VECTOR, {}),
+    "TRPO": (contrib.TRPO, "MlpPolicy", VECTOR, {}),
+    "MaskablePPO": (contrib.MaskablePPO, "MlpPolicy", VECTOR, {}),
+    "RecurrentPPO": (contrib.RecurrentPPO, "MlpLstmPolicy", VECTOR, {"policy_kwargs": LSTM}),
+    "RecurrentPPO of two layers": (
+        contrib.RecurrentPPO, "MlpLstmPolicy", VECTOR,
+        {"policy_kwargs": LSTM | {"n_lstm_layers": 2, "shared_lstm": True,
+                                  "enable_critic_lstm": False}},
+    ),
+    "RecurrentPPO of images": (
+        contrib.RecurrentPPO, "CnnLstmPolicy", IMAGE, {"policy_kwargs": LSTM}
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(params=CASES)
+def model(request) -> Any:
+    kind, policy, space, how = CASES[request.param]
+    made = kind(policy, Seen(space), seed=3, device="cpu", **how)
+    with torch.no_grad():  # fresh networks hardly prefer anything
+        for parameter in made.policy.parameters():
+            parameter.mul_(3.0)
+    return request.param.partition(" of ")[0].partition(",")[0], made, space
+
+
+def drawn(space: gym.Space[Any], count: int) -> np.ndarray:
+    space.seed(4)
+    return np.stack([space.sample() for _ in range(count)])
+
+
+def as_shown(observations: np.ndarray) -> np.ndarray:
+    """Returns observations as our environments show them: images channels first."""
+    return np.moveaxis(observations, -1, 1) if observations.ndim == 4 else observations
+
+
+def theirs(model: Any, observations: np.ndarray, state: Any, begins: np.ndarray) -> np.ndarray:
+    """Returns what the library itself computes: values, or probabilities, and its memory."""
+    seen, _ = model.policy.obs_to_tensor(observations)
+    with torch.no_grad():
+        if hasattr(model.policy, "q_net"):
+            return model.policy.q_net(seen).numpy(), None
+        if hasattr(model.policy, "quantile_net"):
+            return model.policy.quantile_net(seen).mean(dim=1).numpy(), None
+        if not hasattr(model.policy, "lstm_actor"):
+            return model.policy.get_distribution(seen).distribution.probs.numpy(), None
+        lstm = model.policy.lstm_actor
+        blank = torch.zeros(lstm.num_layers, len(observations), lstm.hidden_size)
+        state = (blank, blank) if state is None else state
+        told, state = model.policy.get_distribution(seen, state, torch.tensor(begins).float())
+        return told.distribution.probs.numpy(), state
+
+
+@pytest.mark.parametrize("live", [False, True], ids=["archive", "loaded"])
+def test_every_algorithm_acts_as_its_library_says(model, live, tmp_path):
+    name, made, space = model
+    made.save(tmp_path / "agent")
+    policy = adapt_live(made) if live else read_policy(tmp_path / "agent.zip", Options())
+    observations = drawn(space, 60).reshape(10, 6, *space.shape)
+    mine, their = None, None
+    for step, seen in enumerate(observations):
+        begins = np.array([step == 0, step == 0, step % 3 == 0, step == 4, step == 0, step == 7])
+        begins |= step == 0
+        told, their = theirs(made, seen, their, begins)
+        likely, mine = ask(policy, as_shown(seen), mine, begins)
+        own = policy.q_values(as_shown(seen)) if hasattr(policy, "q_values") else likely
+        np.testing.assert_allclose(own, told, rtol=2e-5, atol=2e-6)
+        np.testing.assert_array_equal(likely.argmax(axis=1), told.argmax(axis=1))
+    assert (policy.about.algorithm.replace("-", ""), policy.about.num_actions) == (
+        name.replace("-", ""),
+        3,
+    )
+    assert policy.about.gamma == 0.99
+    assert policy.about.layers.endswith(" → 15" if name == "QR-DQN" else " → 3")
+    assert policy.about.version
+    assert (policy.about.memory > 0) == (name == "RecurrentPPO") == (mine is not None)
+
+
+def test_what_the_environment_normalises_is_normalised(tmp_path):
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    inside = VecNormalize(DummyVecEnv([lambda: gym.make("CartPole-v1")]))
+    model = sb3.PPO("MlpPolicy", inside, n_steps=32, batch_size=32, seed=0, device="cpu")
+    model.learn(64)
+    agent = trdlab.agent(model, env="CartPole-v1")
+    seen = np.float32([[0.1, 0.2, -0.1, 0.3], [1.0, 0.0, 0.1, 0.0]])
+    likely, _ = ask(agent.policy, seen)
+    tensor, _ = model.policy.obs_to_tensor(inside.normalize_obs(seen))
+    with torch.no_grad():
+        told = model.policy.get_distribution(tensor).distribution.probs.numpy()
+    np.testing.assert_allclose(likely, told, rtol=1e-5)
+    assert agent.evaluate(3, seed=0).returns.min() > 5
+    model.save(tmp_path / "a")
+    inside.save(tmp_path / "a.pkl")
+    read = trdlab.agent(f"{tmp_path}/a.zip,normalize={tmp_path}/a.pkl", env="CartPole-v1")
+    np.testing.assert_allclose(ask(read.policy, seen)[0], told, rtol=1e-5)
+    assert repr(agent) == "<Agent: PPO · not fitted · action 0, action 1>"
+
+
+def test_what_cannot_act_here_is_refused(tmp_path):
+    model = sb3.PPO("MlpPolicy", "Pendulum-v1", device="cpu")
+    with pytest.raises(trdlab.errors.InputError, match="actions of this PPO are Box"):
+        trdlab.agent(model, env="CartPole-v1")
+    model.save(tmp_path / "box")
+    with pytest.raises(trdlab.errors.InputError, match=r"actions of the agent in .* are a Box"):
+        read_policy(tmp_path / "box.zip", Options())
+    soft = sb3.SAC("MlpPolicy", "Pendulum-v1", buffer_size=10, device="cpu")
+    soft.save(tmp_path / "soft")
+    with pytest.raises(trdlab.errors.InputError, match="holds an agent of SAC"):
+        read_policy(tmp_path / "soft.zip", Options())
+    both = gym.spaces.Dict({"a": VECTOR, "b": VECTOR})
+    sb3.PPO("MultiInputPolicy", Seen(both), device="cpu").save(tmp_path / "both")
+    with pytest.raises(trdlab.errors.InputError, match="sees a Dict of observations"):
+        read_policy(tmp_path / "both.zip", Options())
+    assert open_agent(Path(tmp_path / "both.zip")).version

@@ -1,0 +1,238 @@
+"""Experience: what a frozen policy saw, did and was paid, some of its actions forced."""
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.environments import Environments, NotParallel
+from trdlab.environments.batches import Make
+from trdlab.errors import InputError
+from trdlab.estimator import Future
+from trdlab.policies import Policy
+from trdlab.rollouts.playing import Playing
+from trdlab.time_axis import TimeAxis
+
+FAR = int(np.iinfo(np.int64).max)
+_NEVER = 2**40  # steps: no episode is so long
+
+
+@dataclass(frozen=True, eq=False)
+class Experience:
+    """Episodes one after another, in M rows; the last row of each is what was seen after it.
+
+    Args:
+        observations: `[M, ...]`.
+        probabilities: `[M, A]`, of each action under the policy.
+        actions: `[M]`; of no moment in a last row, nor are the rewards.
+        rewards: `[M]`, as the future counts them.
+        ends: `[M]`, whether nothing is left to come after a step.
+        until: `[M]`, the number of the row after each at which the policy would act no more, had
+            the episode gone on for so long: at which another action is forced, or the time is up.
+            It can lie beyond the last row, so that what is left out because of it does not depend
+            on whether an episode had ended by then.
+        last: `[M]`, the number of the last row of the same episode.
+    """
+
+    observations: NDArray[Any]
+    probabilities: FloatArray
+    actions: IntArray
+    rewards: FloatArray
+    ends: BoolArray
+    until: IntArray
+    last: IntArray
+
+    def __len__(self) -> int:
+        return len(self.actions)
+
+    @cached_property
+    def steps(self) -> IntArray:
+        """The rows in which something was done."""
+        return np.flatnonzero(np.arange(len(self)) < self.last)
+
+    @cached_property
+    def _next_end(self) -> IntArray:
+        """`[M]`: the next step after which nothing is left to come; `FAR` if none is known."""
+        return _next(self.ends)
+
+    def ahead(self, rows: IntArray, axis: TimeAxis, most: int | None = None) -> "Ahead":
+        """Returns what followed some steps, as far as the policy itself acted after the first.
+
+        Args:
+            rows: `[K]`, the numbers of the steps.
+            axis: γ, N and w.
+            most: after how many components it is not looked any further; by default after N, or
+                after one where N = 0.
+        """
+        w, reach = axis.width, max(axis.horizon, 1)
+        most = reach if most is None else min(most, reach)
+        end, last, until = self._next_end[rows], self.last[rows], self.until[rows]  # [K] each
+        stop = np.minimum(until, last)  # [K], the first step not to be counted
+        over = (end < stop) & (end < rows + most * w)  # [K]
+        span = np.where(over, reach, np.minimum((stop - rows) // w, most))  # [K]
+        steps = np.arange(reach * w)
+        told = np.where(over, end + 1, rows + span * w)[:, None]  # [K, 1]
+        at = rows[:, None] + steps  # [K, L·w]
+        paid = np.where(at < told, self.rewards[np.minimum(at, last[:, None])], 0.0)
+        paid *= axis.gamma**steps
+        rewards = paid.reshape(len(rows), reach, w).sum(axis=2)  # [K, L]
+        follows = np.minimum(rows + span * w, last)
+        return Ahead(rewards, span, over, follows, (until - rows) // w)
+
+
+@dataclass(frozen=True, eq=False)
+class Ahead:
+    """What followed K steps, in L groups of w: N of them, or one where N = 0.
+
+    Args:
+        rewards: `[K, L]`, what came in each, discounted; 0 from `span` on.
+        span: `[K]`, of how many that is known.
+        over: `[K]`, whether nothing is left to come after that; `span` is L then.
+        follows: `[K]`, the row at which all that is not known is still to come.
+        own: `[K]`, for how many groups the policy acts, were the episode to go on.
+    """
+
+    rewards: FloatArray
+    span: IntArray
+    over: BoolArray
+    follows: IntArray
+    own: IntArray
+
+    def known(self, axis: TimeAxis) -> BoolArray:
+        """Returns `[K, N]`: what is known without any expectation of what is still to come.
+
+        Of steps at which others acted later nothing is known of that, even where the episode had
+        ended by then: it would look likelier to end than it is.
+        """
+        own = np.minimum(self.span, self.own)[:, None]
+        return np.asarray(np.arange(axis.horizon) < own)
+
+    def target(self, axis: TimeAxis, following: FloatArray) -> FloatArray:
+        """Returns the components `[K, N+1]`: what came, and from there on what is expected.
+
+        It is the law, applied as often as there are components that are known.
+
+        Args:
+            axis: γ, N and w.
+            following: `[K, N+1]`, what is expected in the rows that follow, of the policy's action.
+
+        >>> one = np.array([1])
+        >>> ahead = Ahead(np.array([[1.0, 0.0]]), one, np.array([False]), one, one)
+        >>> ahead.target(TimeAxis(0.5, 2), np.array([[2.0, 4.0, 6.0]]))
+        array([[1., 1., 5.]])
+        """
+        horizon, span = axis.horizon, self.span[:, None]  # [K, 1]
+        discount = np.where(self.over, 0.0, axis.gamma ** (axis.width * self.span))[:, None]
+        place = np.arange(horizon) - span  # [K, N]
+        shifted = np.take_along_axis(following, np.maximum(place, 0), axis=1)
+        explicit = np.where(place < 0, self.rewards[:, :horizon], discount * shifted)
+        later = following[:, ::-1].cumsum(axis=1)[:, ::-1]  # [K, N+1], from each component on
+        rest = np.take_along_axis(later, np.maximum(horizon - span, 0), axis=1)
+        residual = self.rewards[:, horizon:].sum(axis=1, keepdims=True) + discount * rest
+        return np.column_stack([explicit, residual])
+
+
+def gather(
+    make: Make,
+    policy: Policy,
+    future: Future,
+    *,
+    steps: int,
+    share: float,
+    pause: int = 0,
+    num_envs: int = 16,
+    max_steps: int | None = None,
+    seed: int = 0,
+    tell: Callable[[int], None] = lambda taken: None,
+) -> Experience:
+    """Plays episodes of a policy, with some of its actions forced, so that others are seen, too.
+
+    Args:
+        make: makes the environments.
+        policy: who acts.
+        future: which rewards count, and what ends.
+        steps: how many are taken at least; the last episodes are played to their end.
+        share: the chance that an action is forced: any of them, evenly.
+        pause: for how many steps none is forced after that.
+        num_envs: how many episodes are played beside each other.
+        max_steps: after which an episode is cut off.
+        seed: of everything.
+        tell: told how many steps have been taken, now and then.
+
+    Raises:
+        InputError: there is no step, or the share is outside [0, 1].
+    """
+    if steps < 1 or not 0.0 <= share <= 1.0:
+        raise InputError(
+            f"There are {steps} steps, and a share of {share} is forced.",
+            "Ask for at least 1 step, and a share from 0 to 1.",
+        )
+    rng, taken, batch, parts = np.random.default_rng(seed), 0, 0, list[Experience]()
+    while taken < steps:
+        own = int(np.random.SeedSequence([seed, batch]).generate_state(1)[0] >> 1)
+        with closing(_some(make, num_envs, own)) as environments:
+            playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
+            parts.append(_played(playing, future, share, pause, rng))
+        taken, batch = taken + len(parts[-1].steps), batch + 1
+        tell(taken)
+    starts = np.repeat(np.cumsum([0, *map(len, parts[:-1])]), [len(part) for part in parts])
+    names = (of.name for of in fields(Experience))
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    moved = {name: columns[name] + starts for name in ("until", "last")}
+    return Experience(**columns | moved)
+
+
+def _some(make: Make, num_envs: int, seed: int) -> Environments:
+    """Returns so many environments, or one where there can be but one."""
+    try:
+        return make(num_envs, seed)
+    except NotParallel:
+        return make(1, seed)
+
+
+def _played(
+    playing: Playing, future: Future, share: float, pause: int, rng: np.random.Generator
+) -> Experience:
+    """Plays one episode in each environment to its end."""
+    count, num_actions = len(playing.running), playing.environments.num_actions
+    log: list[tuple[Any, ...]] = []  # of some episodes a row each
+    free = np.zeros(count, dtype=np.int64)  # [B], from which step on an action may be forced
+    coin = np.zeros(count, dtype=np.int64)  # [B], the step at which the next one would have been
+    while playing.running.any():
+        running, seen, turn = playing.running, playing.stack.observations, playing.turn()
+        seen = seen[running]  # a copy: what is seen changes with the step
+        forced = running & (rng.random(count) < share) & (playing.steps >= free)
+        free = np.where(forced, playing.steps + 1 + pause, free)
+        actions = np.where(forced, rng.integers(num_actions, size=count), turn.own)
+        step = playing.take(actions)
+        ends = future.ends(step.terminated, step.truncated, step.life_lost)
+        told = (part[running] for part in (actions, future.count(step.rewards), ends, forced))
+        log.append((np.flatnonzero(running), seen, turn.probabilities, *told))
+        if playing.finished.any():
+            over = np.flatnonzero(playing.finished)
+            wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
+            coin[over] = np.maximum(playing.steps, free[over]) + wait
+            nothing = np.zeros(len(over))
+            none = nothing > 0.0
+            log.append((over, *playing.last_seen(), nothing.astype(np.int64), nothing, none, none))
+    episode, *columns = (np.concatenate(column) for column in zip(*log, strict=True))
+    order, lengths = np.argsort(episode, kind="stable"), np.bincount(episode)
+    *columns, were_forced = (column[order] for column in columns)
+    last = np.repeat(lengths.cumsum() - 1, lengths)  # [M]
+    first = np.repeat(lengths.cumsum() - lengths, lengths)  # [M]
+    until = np.append(_next(were_forced)[1:], FAR)
+    until = np.where(until < last, until, first + np.repeat(coin, lengths))
+    own = None if future.time_limit_ends else playing.environments.time_limit
+    limits = [limit for limit in (own, playing.max_steps) if limit is not None]
+    until = np.minimum(until, first + min(limits, default=_NEVER))
+    return Experience(*(*columns, until, last))
+
+
+def _next(flags: BoolArray) -> IntArray:
+    places = np.where(flags, np.arange(len(flags)), FAR)
+    return np.asarray(np.minimum.accumulate(places[::-1])[::-1])

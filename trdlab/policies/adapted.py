@@ -1,0 +1,165 @@
+"""What all agents of other libraries become here: a policy, and what is known about it."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from math import prod
+from typing import Any, Self
+
+import gymnasium as gym
+import numpy as np
+
+from trdlab.arrays import BoolArray, FloatArray
+from trdlab.environments.interface import Interface
+from trdlab.errors import InputError
+from trdlab.policies.ready import greedy
+
+
+@dataclass(frozen=True)
+class About:
+    """What is known about an agent that was trained elsewhere.
+
+    Args:
+        algorithm: what trained it, such as `PPO`, or what it is.
+        library: whose it is.
+        version: of the library, if that is said.
+        seen: the shape of an observation, images channels first; None where nothing says it. States
+            by number are n numbers, of which one is 1.
+        num_actions: A; None where nothing says it.
+        layers: the sizes of what it computes, from what it sees to what it says.
+        activation: between its layers.
+        memory: how many numbers it remembers from step to step.
+        gamma: γ that it was trained with, if that is said.
+        draws: whether it draws its actions from probabilities, rather than taking the best.
+
+    >>> About("PPO", "Stable-Baselines3", "2.0", (4,), 2).title
+    'PPO of Stable-Baselines3 2.0'
+    """
+
+    algorithm: str
+    library: str = ""
+    version: str = ""
+    seen: tuple[int, ...] | None = None
+    num_actions: int | None = None
+    layers: str = ""
+    activation: str = ""
+    memory: int = 0
+    gamma: float | None = None
+    draws: bool = True
+
+    @property
+    def title(self) -> str:
+        """What it is, and whose."""
+        of = f"{self.library} {self.version}".strip()
+        return f"{self.algorithm} of {of}" if of else self.algorithm
+
+    @property
+    def needs(self) -> str:
+        """What would fit, in words."""
+        seen = f"observations of shape {self.seen}" if self.seen else "any observations"
+        return f"{seen} and {self.num_actions or 'any'} actions"
+
+    def check_fits(self, there: Interface, place: str, name: str) -> None:
+        """Checks that it can act somewhere.
+
+        Args:
+            there: what is seen and can be done there.
+            place: what that is called.
+            name: what the agent is called.
+
+        Raises:
+            InputError: it cannot; the message names what was found, and what would fit.
+        """
+        seen = self.seen is None or _fits(there.space, self.seen)
+        if not seen or self.num_actions not in (None, len(there.action_names)):
+            raise InputError(
+                f"'{place}' does not fit '{name}': it has {there.seen} to see and {there.done}.",
+                f"This {self.algorithm} needs {self.needs}.",
+            )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns plain data, for JSON."""
+        return {**asdict(self), "seen": None if self.seen is None else list(self.seen)}
+
+
+@dataclass(frozen=True, eq=False)
+class Valuing:
+    """Takes the action of largest value, of equals the first.
+
+    Args:
+        about: what is known about it.
+        values: from observations `[B, ...]` to the value of each action `[B, A]`.
+    """
+
+    about: About
+    values: Callable[[Any], FloatArray]
+
+    def seeing(self, change: Callable[[Any], Any]) -> Self:
+        """Returns the same, that sees observations changed."""
+        return replace(self, values=lambda observations: self.values(change(observations)))
+
+    def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
+        """Returns 1 for that action `[B, A]`; there is nothing to remember."""
+        return greedy(self.q_values(observations)), None
+
+    def q_values(self, observations: Any) -> FloatArray:
+        """Returns the value of each action `[B, A]`.
+
+        Raises:
+            InputError: one is no number.
+        """
+        values = np.asarray(self.values(observations))
+        if (wrong := np.isnan(values).any(axis=1)).any():
+            row = int(np.argmax(wrong))
+            raise InputError(
+                f"The policy's values at observation {row} of {len(values)} are no numbers: "
+                f"{values[row].tolist()}.",
+                "Look whether that observation holds one.",
+            )
+        return values
+
+
+Scores = Callable[[Any, Any, BoolArray], tuple[FloatArray, Any]]
+"""From observations, what is remembered and where episodes begin to logits `[B, A]` and memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Draws its actions from the softmax of logits.
+
+    Args:
+        about: what is known about it.
+        scores: the logits, and what to remember.
+    """
+
+    about: About
+    scores: Scores
+
+    def seeing(self, change: Callable[[Any], Any]) -> Self:
+        """Returns the same, that sees observations changed."""
+        own = self.scores
+        return replace(self, scores=lambda seen, state, begins: own(change(seen), state, begins))
+
+    def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
+        """Returns the probabilities `[B, A]`, and what to remember."""
+        logits, state = self.scores(observations, state, begins)
+        return softmax(logits), state
+
+
+def softmax(logits: FloatArray) -> FloatArray:
+    """Returns the probabilities `[B, A]` of logits `[B, A]`.
+
+    >>> softmax(np.log([[1.0, 3.0]])).tolist()
+    [[0.25, 0.75]]
+    """
+    up = np.asarray(logits, dtype=np.float64)
+    odds = np.exp(up - up.max(axis=1, keepdims=True))
+    return np.asarray(odds / odds.sum(axis=1, keepdims=True))
+
+
+def _fits(space: gym.Space[Any], seen: tuple[int, ...]) -> bool:
+    """Returns whether observations of a space are what an agent sees."""
+    if isinstance(space, gym.spaces.Discrete):
+        return seen == (space.n,)
+    shape = space.shape or ()
+    flat = len(seen) == 1 and prod(shape) == seen[0]
+    return flat or [size for size in shape if size != 1] == [size for size in seen if size != 1]

@@ -1,0 +1,132 @@
+"""Agents of Stable-Baselines3 and sb3-contrib that are loaded already, asked as they are."""
+
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import torch
+
+from trdlab.arrays import BoolArray, FloatArray
+from trdlab.errors import InputError
+from trdlab.policies.adapted import About, Drawing, Valuing
+from trdlab.policies.networks import sizes
+
+
+def adapt(model: Any) -> Drawing | Valuing | None:
+    """Returns a loaded model as a policy; None where it is none.
+
+    What its environment normalises (`VecNormalize`) is normalised here too, if the model has it.
+
+    Args:
+        model: whatever has `predict` and `policy`, such as what `PPO.load` returns.
+
+    Raises:
+        InputError: it gives neither values nor a distribution over actions.
+    """
+    policy = getattr(model, "policy", None)
+    if policy is None or not hasattr(model, "predict") or not hasattr(policy, "obs_to_tensor"):
+        return None
+    kind = type(model).__name__
+    space, actions = model.observation_space, model.action_space
+    if not hasattr(actions, "n"):
+        raise InputError(
+            f"The actions of this {kind} are {actions}.",
+            "A decomposition has one row per action: they must be Discrete.",
+        )
+    values = next((of for of in ("q_net", "quantile_net") if hasattr(policy, of)), None)
+    if values is None and not hasattr(policy, "get_distribution"):
+        raise InputError(
+            f"This {kind} has no values of actions, and no distribution over them.",
+            "Give a function from observations to action probabilities.",
+        )
+    memory = getattr(policy, "lstm_actor", None)
+    shape, size = space.shape or (), getattr(space, "n", 0)
+    library = type(model).__module__.partition(".")[0]
+    about = About(
+        kind,
+        {"stable_baselines3": "Stable-Baselines3"}.get(library, library.replace("_", "-")),
+        str(getattr(import_module(library), "__version__", "")),
+        (int(size),) if size else tuple(shape),
+        int(actions.n),
+        layers=_layers(policy, values),
+        activation=getattr(getattr(policy, "activation_fn", None), "__name__", ""),
+        memory=2 * memory.num_layers * memory.hidden_size if memory else 0,
+        gamma=float(model.gamma),
+        draws=values is None,
+    )
+    asked = _Asked(model)
+    if values is None:
+        return Drawing(about, asked.remembering if memory else asked.logits)
+    return Valuing(about, asked.quantiles if values == "quantile_net" else asked.values)
+
+
+def _layers(policy: Any, values: str | None) -> str:
+    """Returns the sizes of what acts; the names of its parts are those of the library."""
+    if values is not None:
+        return sizes(getattr(policy, values))
+    extractor = getattr(policy, "mlp_extractor", None)
+    parts = (
+        getattr(policy, "pi_features_extractor", None),
+        getattr(policy, "lstm_actor", None),
+        getattr(extractor, "policy_net", None),
+        getattr(policy, "action_net", None),
+    )
+    return sizes(*filter(None, parts))
+
+
+class _Asked:
+    """A loaded model, and what it says of observations.
+
+    Args:
+        model: see `adapt`.
+    """
+
+    def __init__(self, model: Any) -> None:
+        self._policy = model.policy
+        finder = getattr(model, "get_vec_normalize_env", lambda: None)
+        self._normalise = finder()
+        self._policy.set_training_mode(False)
+
+    def values(self, observations: Any) -> FloatArray:
+        """Returns the value of each action `[B, A]`."""
+        with torch.no_grad():
+            return _array(self._policy.q_net(self._seen(observations)))
+
+    def quantiles(self, observations: Any) -> FloatArray:
+        """Returns the mean of the quantiles of each action `[B, A]`."""
+        with torch.no_grad():
+            return _array(self._policy.quantile_net(self._seen(observations)).mean(dim=1))
+
+    def logits(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
+        """Returns the logits of each action `[B, A]`, and nothing to remember."""
+        with torch.no_grad():
+            told = self._policy.get_distribution(self._seen(observations))
+        return _array(told.distribution.logits), None
+
+    def remembering(
+        self, observations: Any, state: Any, begins: BoolArray
+    ) -> tuple[FloatArray, Any]:
+        """Returns the logits of each action `[B, A]`, and a pair `[B, layers, hidden]`."""
+        policy, lstm = self._policy, self._policy.lstm_actor
+        blank = np.zeros((len(begins), lstm.num_layers, lstm.hidden_size), dtype=np.float32)
+        held = (blank, blank) if state is None else state
+        now = tuple(
+            torch.as_tensor(part, device=policy.device).transpose(0, 1).contiguous()
+            for part in held
+        )
+        starts = torch.as_tensor(begins, dtype=torch.float32, device=policy.device)
+        with torch.no_grad():
+            told, then = policy.get_distribution(self._seen(observations), now, starts)
+        return _array(told.distribution.logits), tuple(
+            _array(part.transpose(0, 1)) for part in then
+        )
+
+    def _seen(self, observations: Any) -> Any:
+        """Returns observations as the policy takes them."""
+        if self._normalise is not None:
+            observations = self._normalise.normalize_obs(observations)
+        return self._policy.obs_to_tensor(observations)[0]
+
+
+def _array(tensor: torch.Tensor) -> FloatArray:
+    return np.ascontiguousarray(tensor.cpu().numpy())

@@ -1,0 +1,83 @@
+"""The adapters: whose agents can be read, from files and from memory."""
+
+from importlib import import_module
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from trdlab.errors import InputError
+from trdlab.policies.adapted import Drawing, Valuing
+from trdlab.policies.files import Options, open_agent
+from trdlab.policies.normalisation import read_normalisation
+from trdlab.policies.protocol import Policy
+from trdlab.policies.ready import Likeliest
+
+_FILES = ("stable_baselines3", "cleanrl", "linear")
+"""Modules here with an `adapt(file, options)`; the first that knows a file has it."""
+
+_OBJECTS = ("live",)
+"""Likewise with an `adapt(object)`."""
+
+_LARGEST = 10_000_000  # numbers in an observation
+
+
+def read_policy(path: Path, options: Options) -> Policy:
+    """Returns the agent in a file of another library; what it is follows from what it holds.
+
+    Args:
+        path: of the file.
+        options: what it does not say.
+
+    Raises:
+        InputError: it is torn, holds code, or is of nobody who is known here.
+    """
+    file = open_agent(path)
+    for name in _FILES:
+        found: Drawing | Valuing | None = _adapter(name)(file, options)
+        if found is not None:
+            return _acting(found, options, path)
+    raise InputError(f"'{path}' is no agent that is known.", "Give trdlab.agent a function.")
+
+
+def policy_of(what: Any) -> Policy | None:
+    """Returns an object of another library as a policy, or a policy as it is; None elsewhere.
+
+    Raises:
+        InputError: it is one of theirs, and cannot act here.
+    """
+    if isinstance(what, Policy):
+        return what
+    if hasattr(what, "predict") and hasattr(what, "policy"):
+        adapted = (_adapter(name)(what) for name in _OBJECTS)
+        return next((found for found in adapted if found is not None), None)
+    return None
+
+
+def _adapter(name: str) -> Any:
+    return import_module(f"trdlab.policies.{name}").adapt  # by name: they import PyTorch
+
+
+def _acting(found: Drawing | Valuing, options: Options, path: Path) -> Policy:
+    """Returns an agent as it should act, once it has acted."""
+    seen = found.about.seen or ()
+    try:
+        if prod(seen) > _LARGEST:
+            raise RuntimeError(f"it sees {prod(seen):,} numbers")  # noqa: TRY301
+        found.act(np.zeros((1, *seen), dtype=np.float32), None, np.ones(1, dtype=np.bool_))
+    except RuntimeError as error:  # how PyTorch says that layers do not follow each other
+        reason = str(error).splitlines()[0]
+        raise InputError(
+            f"The network in '{path}' cannot be shown what it says to see, {seen}: {reason}.",
+            "Save the agent again.",
+        ) from error
+    if options.greedy is False and isinstance(found, Valuing):
+        raise InputError(
+            f"'{path}' holds the values of actions, and no probabilities to draw from.",
+            "Leave out greedy.",
+        )
+    if options.normalize is not None:
+        change = read_normalisation(Path(options.normalize), found.about.seen)
+        found = found if change is None else found.seeing(change)
+    return Likeliest(found) if options.greedy and isinstance(found, Drawing) else found

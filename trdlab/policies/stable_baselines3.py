@@ -1,0 +1,304 @@
+"""Agents in the archives of Stable-Baselines3 and sb3-contrib; neither has to be installed.
+
+Only tensors and plain JSON are read: what an archive holds as pickles stays unread. Layers and
+their sizes follow from the tensors. The formats are those of versions 1.0 to 2.9.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from torch import nn
+
+from trdlab.arrays import FloatArray
+from trdlab.errors import InputError
+from trdlab.policies.adapted import About, Drawing, Valuing
+from trdlab.policies.files import AgentFile, Options
+from trdlab.policies.networks import (
+    Network,
+    Recurrent,
+    Weights,
+    activation,
+    convolutions,
+    dense,
+    flow,
+    lstm,
+    numbered,
+    plain,
+    sizes,
+)
+
+LIBRARY = "Stable-Baselines3"
+_KNOWN = ("DQN", "PPO", "A2C", "QR-DQN", "MaskablePPO", "RecurrentPPO", "TRPO")
+_GIVE_MODEL = "Load it with its library, and give the model to trdlab.agent."
+_STRIDES = (4, 2, 1)  # of its NatureCNN
+_BYTES = 255.0
+
+# What does not act: critics, targets, and the twins of a shared extractor.
+_IDLE = re.compile(
+    r"(q_net_target|quantile_net_target|value_net|vf_features_extractor|pi_features_extractor"
+    r"|mlp_extractor\.value_net|lstm_critic|critic)\."
+)
+_EXTRACTOR = r"features_extractor\.(cnn\.\d+|linear\.0)\.(weight|bias)"
+_VALUES = re.compile(
+    rf"(q_net|quantile_net)\.({_EXTRACTOR}|(q_net|quantile_net)\.\d+\.(weight|bias))"
+)
+_ACTOR = re.compile(
+    rf"{_EXTRACTOR}|mlp_extractor\.policy_net\.\d+\.(weight|bias)|action_net\.(weight|bias)"
+    r"|lstm_actor\.(weight|bias)_(ih|hh)_l\d+"
+)
+
+
+def adapt(file: AgentFile, options: Options) -> Drawing | Valuing | None:
+    """Returns the agent in an archive; None where the file is none.
+
+    Args:
+        file: what was read of it.
+        options: the activation is by default what the file says, or that of the algorithm.
+
+    Raises:
+        InputError: the algorithm, or a part of its network, cannot be read.
+    """
+    if not file.data:
+        return None
+    saved = _Saved.of(file)
+    return _valuing(saved, options) if saved.values else _drawing(saved, options)
+
+
+@dataclass(frozen=True, eq=False)
+class _Saved:
+    """An archive, as far as it matters how its agent acts.
+
+    Args:
+        algorithm: its name.
+        weights: those that act, by name.
+        values: the name of its network of values, if it has one.
+        file: the archive.
+        kwargs: how its policy was made.
+    """
+
+    algorithm: str
+    weights: Weights
+    values: str
+    file: AgentFile
+    kwargs: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, file: AgentFile) -> "_Saved":
+        weights = {name: of for name, of in file.weights.items() if not _IDLE.match(name)}
+        values = next(
+            (of for of in ("q_net", "quantile_net") if f"{of}.{of}.0.weight" in weights), ""
+        )
+        kwargs = file.data.get("policy_kwargs")
+        saved = cls(
+            _algorithm(file, values),
+            weights,
+            values,
+            file,
+            kwargs if isinstance(kwargs, dict) else {},
+        )
+        saved.check()
+        return saved
+
+    def check(self) -> None:
+        """Refuses a network that is not the library's own."""
+        path, known = self.file.path, _VALUES if self.values else _ACTOR
+        module = _module(self.file.data)
+        if module.partition(".")[0] not in ("", "stable_baselines3", "sb3_contrib"):
+            raise InputError(
+                f"The policy in '{path}' is of a class of its own, in the module '{module}'.",
+                _GIVE_MODEL,
+            )
+        if self.algorithm not in _KNOWN:
+            raise InputError(
+                f"'{path}' holds an agent of {self.algorithm}.",
+                f"Those of {', '.join(_KNOWN)} can be read; give trdlab.agent the loaded model.",
+            )
+        if kind := _kind(self.file.data.get("observation_space"), "Dict", "Tuple", "MultiDiscrete"):
+            raise InputError(
+                f"The agent in '{path}' sees a {kind} of observations.",
+                "Agents that see a Box or Discrete space can be read.",
+            )
+        if kind := _kind(self.file.data.get("action_space"), "Box", "MultiDiscrete", "MultiBinary"):
+            raise InputError(
+                f"The actions of the agent in '{path}' are a {kind}.",
+                "A decomposition has one row per action: they must be Discrete.",
+            )
+        if strange := [name for name in self.weights if not known.fullmatch(name)]:
+            raise InputError(
+                f"'{path}' has '{strange[0]}', which {self.algorithm} of {LIBRARY} does not have "
+                "of itself.",
+                _GIVE_MODEL,
+            )
+
+    def about(self, seen: tuple[int, ...], num_actions: int, **more: Any) -> About:
+        """Returns what is known."""
+        gamma = self.file.data.get("gamma")
+        return About(
+            self.algorithm,
+            LIBRARY,
+            self.file.version,
+            seen,
+            num_actions,
+            gamma=gamma if isinstance(gamma, float | int) else None,
+            **more,
+        )
+
+    def activation(self, options: Options) -> type[nn.Module]:
+        """Returns what stands between its dense layers."""
+        said = re.search(r"\.(\w+)'>$", str(self.kwargs.get("activation_fn", "")))
+        usual = "ReLU" if self.values else "Tanh"
+        return activation(options.activation or (said[1] if said else usual))
+
+    def features(self, prefix: str) -> tuple[list[nn.Module], tuple[int, ...], float]:
+        """Returns what stands before the dense layers, what is seen, and what divides it."""
+        names = numbered(self.weights, f"{prefix}cnn.")
+        space = self.file.data.get("observation_space")
+        shape, size = _shape(space), _states(space)
+        is_image = (
+            len(shape) == 3 and isinstance(space, dict) and "uint8" in str(space.get("dtype"))
+        )
+        raw = str(self.kwargs.get("normalize_images", True)) == "False" or not is_image
+        divisor = 1.0 if raw else _BYTES
+        if not names:
+            return [nn.Flatten()], shape or ((size,) if size else ()), divisor
+        linear = dense(self.weights, [f"{prefix}linear.0"], nn.ReLU, ends=True)
+        return [convolutions(self.weights, names, _STRIDES), linear], shape, divisor
+
+
+def _valuing(saved: _Saved, options: Options) -> Valuing:
+    """Returns the agent of DQN or QR-DQN."""
+    between, of = saved.activation(options), saved.values
+    before, seen, divisor = saved.features(f"{of}.features_extractor.")
+    head = dense(saved.weights, numbered(saved.weights, f"{of}.{of}."), between)
+    (_, outputs), actions = flow(head), _actions(saved.file.data)
+    quantiles = outputs // actions if of == "quantile_net" and actions else 1
+    count = outputs // quantiles
+    _check_actions(saved, count)
+    network = Network(nn.Sequential(*before, head), _seen(saved, seen, before, head), divisor)
+    about = saved.about(
+        network.seen,
+        count,
+        layers=sizes(network.layers),
+        activation=_named(between, head),
+        draws=False,
+    )
+
+    def values(observations: Any) -> FloatArray:
+        told = network(observations)
+        return np.asarray(told.reshape(len(told), quantiles, count).mean(axis=1))
+
+    return Valuing(about, values)
+
+
+def _drawing(saved: _Saved, options: Options) -> Drawing:
+    """Returns the agent of an algorithm with an actor."""
+    between, weights = saved.activation(options), saved.weights
+    before, seen, divisor = saved.features("features_extractor.")
+    hidden = dense(weights, numbered(weights, "mlp_extractor.policy_net."), between, ends=True)
+    last = dense(weights, ["action_net"], between)
+    after = nn.Sequential(*hidden, *last)
+    _, count = flow(last)
+    _check_actions(saved, count)
+    told: dict[str, Any] = {"activation": _named(between, hidden)}
+    if saved.algorithm != "RecurrentPPO":
+        network = Network(nn.Sequential(*before, after), _seen(saved, seen, before, after), divisor)
+        about = saved.about(network.seen, count, layers=sizes(network.layers), **told)
+        return Drawing(about, plain(network))
+    memory = lstm(weights, "lstm_actor.")
+    network = Network(nn.Sequential(*before), _seen(saved, seen, before, memory), divisor)
+    about = saved.about(
+        network.seen,
+        count,
+        layers=sizes(network.layers, memory, after),
+        memory=2 * memory.num_layers * memory.hidden_size,
+        **told,
+    )
+    return Drawing(about, Recurrent(network, memory, after))
+
+
+def _seen(
+    saved: _Saved, said: tuple[int, ...], before: list[nn.Module], after: nn.Module
+) -> tuple[int, ...]:
+    """Returns the shape of an observation: what the archive says, if the first layer agrees."""
+    first = next(layer for part in (*before, after) for layer in part.modules() if _takes(layer))
+    takes = _takes(first)
+    if isinstance(first, nn.Conv2d):
+        if len(said) == 3 and said[0] == takes:
+            return said
+        raise InputError(
+            f"The network in '{saved.file.path}' takes {takes} channels, and the archive says that "
+            f"observations have shape {said}.",
+            _GIVE_MODEL,
+        )
+    return said if int(np.prod(said)) == takes and said else (takes,)
+
+
+def _takes(layer: nn.Module) -> int:
+    if isinstance(layer, nn.Conv2d):
+        return layer.in_channels
+    return int(getattr(layer, "in_features", 0) or getattr(layer, "input_size", 0))
+
+
+def _named(between: type[nn.Module], layers: nn.Sequential) -> str:
+    return between.__name__ if any(isinstance(layer, between) for layer in layers) else ""
+
+
+def _check_actions(saved: _Saved, count: int) -> None:
+    """Refuses a network that has more or fewer outputs than there are actions."""
+    said = _actions(saved.file.data)
+    if said and said != count:
+        raise InputError(
+            f"The network in '{saved.file.path}' has {count} outputs for {said} actions.",
+            "Save the model again: model.save(…).",
+        )
+
+
+def _algorithm(file: AgentFile, values: str) -> str:
+    """Returns the algorithm that an archive is of; it does not say so itself."""
+    data, weights, module = file.data, file.weights, _module(file.data)
+    if values:
+        return "QR-DQN" if values == "quantile_net" else "DQN"
+    if any(name.startswith("lstm_actor.") for name in weights):
+        return "RecurrentPPO"
+    if "action_net.weight" in weights:
+        if "maskable" in module:
+            return "MaskablePPO"
+        if "clip_range" in data:
+            return "PPO"
+        return "TRPO" if "cg_max_steps" in data else "A2C"
+    found = re.search(r"\.(\w+)\.policies$", module)
+    return found[1].upper() if found else "an unknown algorithm"
+
+
+def _module(data: Mapping[str, Any]) -> str:
+    kind = data.get("policy_class")
+    return str(kind.get("__module__", "")) if isinstance(kind, dict) else ""
+
+
+def _kind(space: Any, *kinds: str) -> str:
+    """Returns which of some kinds a space is, if it is one of them."""
+    said = str(space.get(":type:", "")) if isinstance(space, dict) else ""
+    return next((kind for kind in kinds if said.endswith(f".{kind}'>")), "")
+
+
+def _shape(space: Any) -> tuple[int, ...]:
+    """Returns the shape of a Box; () where none is said."""
+    if not isinstance(space, dict) or not _kind(space, "Box"):
+        return ()
+    said = space.get("_shape", space.get("shape", ""))
+    return tuple(map(int, re.findall(r"\d{1,9}", str(said))))
+
+
+def _states(space: Any) -> int:
+    """Returns the number of states of a Discrete space; 0 where none is said."""
+    if not isinstance(space, dict) or not _kind(space, "Discrete"):
+        return 0
+    said = str(space.get("n", ""))
+    return int(said) if said.isdecimal() and len(said) < 10 else 0
+
+
+def _actions(data: Mapping[str, Any]) -> int:
+    return _states(data.get("action_space"))

@@ -156,7 +156,7 @@ def train(
     Args:
         env: a Gymnasium id with discrete actions, such as `CartPole-v1`, or an Atari game.
         kind: `gym` or `atari`; by default whatever `env` names.
-        preset: the settings to begin from, such as `smoke`; by default those of the kind.
+        preset: the settings to begin from, such as `smoke`; by default the environment's own.
         out: the run's folder; by default a new one in `runs`.
         on_metrics: told of the score and the loss, now and then.
         settings: single ones in place of the preset's, by the names that `trdlab train` gives them,

@@ -15,6 +15,7 @@ from trdlab.deep.presets import DEFAULT_PRESETS, PRESETS
 if TYPE_CHECKING:
     from trdlab.deep.settings import Kind, TrainSettings
     from trdlab.rollouts.evaluation import Evaluation
+    from trdlab.runs import RunFolder
     from trdlab.training.run import Run
 
 train = typer.Typer(help="Train a network that decomposes.", no_args_is_help=True)
@@ -274,7 +275,7 @@ def _carry_on(
     if line := best_line(path, steps, best_step(run.folder)):
         _say(errors, line)
     if settings.evaluate_episodes:
-        _compare_with_chance(path, _evaluate(path), settings)
+        _compare_with_chance(run.folder, _evaluate(path), settings)
 
 
 def _named(run: Path, checkpoint: int | None) -> tuple[Path, int | None]:
@@ -305,7 +306,9 @@ def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
     return result
 
 
-def _compare_with_chance(path: Path, result: "Evaluation", settings: "TrainSettings") -> None:
+def _compare_with_chance(
+    folder: "RunFolder", result: "Evaluation", settings: "TrainSettings"
+) -> None:
     """Says so if an agent plays no better than random actions do."""
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.show.training import chance_line
@@ -313,8 +316,8 @@ def _compare_with_chance(path: Path, result: "Evaluation", settings: "TrainSetti
 
     errors = _errors()
     with EpisodeProgress(errors) as progress:
-        chance, _ = evaluate_run(path, epsilon=1.0, watch=progress.on_progress)
-    more = common.command(["resume", str(path)], {"--agent-steps": str(2 * settings.agent_steps)})
+        chance, _ = evaluate_run(folder.path, epsilon=1.0, watch=progress.on_progress)
+    more = f"{folder.resume_command} --agent-steps {2 * settings.agent_steps}"
     cure = f"Train longer: {more}; or try other settings"
     if settings.epsilon_hold == 1:
         cure += ", such as --epsilon-hold 10"

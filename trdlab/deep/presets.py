@@ -155,8 +155,8 @@ def preset_line(kind: Kind, env: str, name: str | None = None) -> str:
 
     >>> preset_line("gym", "MountainCar-v0")
     'Settings: the preset mountain-car, made for MountainCar-v0.'
-    >>> preset_line("gym", "Taxi-v3")
-    'Settings: the preset classic. None are known for Taxi-v3: it may need others.'
+    >>> preset_line("gym", "FrozenLake-v1")
+    'Settings: the preset classic. None are known for FrozenLake-v1: it may need others.'
     """
     wanted = name or default_preset(kind, env)
     if wanted == _own(kind, env):

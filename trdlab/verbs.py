@@ -37,41 +37,32 @@ def agent(
 ) -> "Agent":
     """Returns an agent: who acts, where, and what it expects.
 
-        Args:
-    <<<<<<< HEAD
-            what: a run's folder, `RUN@STEP` or `RUN@best` for another checkpoint; that of a fit;
-                `gridworld:drone`, a map file or `tabular:FrozenLake-v1`, for the exact table of a
-                model; a gridworld or another model; a table that is solved already; any `Estimator`,
-                such as one of your own; or an agent. Of others, who know nothing of their future until
-                they are fitted: a file of Stable-Baselines3 or CleanRL, a loaded model, a `Policy`, or
-                a function from an observation to an action's number, or from observations to
-                probabilities.
-    =======
-            what: a run's folder, `RUN@STEP` or `RUN@best` for another checkpoint; `gridworld:drone`, a
-                map file or `tabular:FrozenLake-v1`, for the exact table of a model; a gridworld or
-                another model; a table that is solved already; any `Estimator`, such as one of your own;
-                or an agent. Of others, who know nothing of their future until they are fitted: a file
-                of Stable-Baselines3 or CleanRL, a loaded model, a `Policy`, or a function from an
-                observation to an action's number, or from observations to probabilities.
-    >>>>>>> presets
-            env: where it acts, if that is not where it was made for: a Gymnasium id, an environment, a
-                function that makes one, or a model or its name. An estimator of your own needs it, and
-                so does an agent of others; that can also act in an Atari game.
-            env_arguments: what to make the environment of an id with.
-            gamma: γ of a model's table, by default 0.95. Whatever else has its own, as it has N and w.
-            horizon: N of a model's table, by default 4.
-            width: w of a model's table, by default 1.
-            policy: who acts, where that is not the estimator's greedy policy: a `Policy`, or a function
-                from observations `[B, ...]` to action probabilities `[B, A]`.
-            name: what to call it.
-            action_names: A names, in place of those that the environment tells.
+    Args:
+        what: a run's folder, `RUN@STEP` or `RUN@best` for another checkpoint; that of a fit;
+            `gridworld:drone`, a map file or `tabular:FrozenLake-v1`, for the exact table of a
+            model; a gridworld or another model; a table that is solved already; any `Estimator`,
+            such as one of your own; or an agent. Of others, who know nothing of their future until
+            they are fitted: a file of Stable-Baselines3 or CleanRL, a loaded model, a `Policy`, or
+            a function from an observation to an action's number, or from observations to
+            probabilities.
+        env: where it acts, if that is not where it was made for: a Gymnasium id, an environment, a
+            function that makes one, or a model or its name. An estimator of your own needs it, and
+            so does an agent of others; that can also act in an Atari game.
+        env_arguments: what to make the environment of an id with.
+        gamma: γ of a model's table, by default 0.95. Whatever else has its own, as it has N and w.
+        horizon: N of a model's table, by default 4.
+        width: w of a model's table, by default 1.
+        policy: who acts, where that is not the estimator's greedy policy: a `Policy`, or a function
+            from observations `[B, ...]` to action probabilities `[B, A]`.
+        name: what to call it.
+        action_names: A names, in place of those that the environment tells.
 
-        Raises:
-            InputError: there is no such agent, something does not fit it, or this is none; the message
-                says what is missing.
+    Raises:
+        InputError: there is no such agent, something does not fit it, or this is none; the message
+            says what is missing.
 
-        >>> agent("gridworld:drone").action_names
-        ('up', 'down', 'left', 'right')
+    >>> agent("gridworld:drone").action_names
+    ('up', 'down', 'left', 'right')
     """
     from trdlab.agents.given import agent_of
     from trdlab.agents.models import model_of

@@ -34,29 +34,23 @@ def find_agent(
 ) -> Agent:
     """Returns an agent by its name.
 
-        That is a run's folder, or `RUN@STEP` for an older checkpoint of it, or `RUN@best` for the one
-    <<<<<<< HEAD
-        of the best score; the folder of a fit; for the exact table of a model, `gridworld:NAME`, a map
-        file, or `tabular:ENV_ID`, each with what to make it with after commas, such as
-        `gridworld:ledge,slip=0.2`; a file of an agent that another library trained, or
-    =======
-        of the best score; or, for the exact table of a model, `gridworld:NAME`, a map file, or
-        `tabular:ENV_ID`, each with what to make it with after commas, such as
-        `gridworld:ledge,slip=0.2`; or a file of an agent that another library trained, or
-    >>>>>>> presets
-        `python:FILE.py:FUNCTION`, whose function makes one.
+    That is a run's folder, or `RUN@STEP` for an older checkpoint of it, or `RUN@best` for the one
+    of the best score; the folder of a fit; for the exact table of a model, `gridworld:NAME`, a map
+    file, or `tabular:ENV_ID`, each with what to make it with after commas, such as
+    `gridworld:ledge,slip=0.2`; a file of an agent that another library trained, or
+    `python:FILE.py:FUNCTION`, whose function makes one.
 
-        Args:
-            name: of the agent.
-            gamma: of an exact table, by default 0.95; a run has its own, and its own N and w.
-            horizon: N of an exact table, by default 4.
-            width: w of an exact table, by default 1.
-            env: an environment to act in instead of its own (see `find_place`).
-            env_arguments: what to make that one with, as `KEY=VALUE`.
+    Args:
+        name: of the agent.
+        gamma: of an exact table, by default 0.95; a run has its own, and its own N and w.
+        horizon: N of an exact table, by default 4.
+        width: w of an exact table, by default 1.
+        env: an environment to act in instead of its own (see `find_place`).
+        env_arguments: what to make that one with, as `KEY=VALUE`.
 
-        Raises:
-            InputError: there is no such agent, or something does not fit it.
-            TrdlabError: a run is torn.
+    Raises:
+        InputError: there is no such agent, or something does not fit it.
+        TrdlabError: a run is torn.
     """
     where: dict[str, Any] = {"env": env, "env_arguments": env_arguments}
     if name.startswith(PYTHON):

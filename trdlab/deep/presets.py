@@ -69,7 +69,7 @@ _FAR: Config = {
     "num_envs": 8,
     "learning_starts": 2_000,
     "learning_rate_end": 0.0,
-    "batch_size": 64,
+    "gamma": 0.98,
     "hidden": [128, 128],
     "epsilon_end": 0.05,
 }
@@ -82,6 +82,7 @@ PRESETS["gym"] |= {
             "epsilon_steps": 20_000,
             "epsilon_hold": 4,
             "update_every": 1,
+            "batch_size": 128,
             "learning_rate": 6.3e-4,
             "loss": "huber",
             "max_grad_norm": 10.0,
@@ -92,10 +93,10 @@ PRESETS["gym"] |= {
         _FAR
         | {
             "agent_steps": 80_000,
-            "gamma": 0.98,
             "epsilon_steps": 30_000,
             "epsilon_hold": 30,  # a car that is pushed to and fro at random stays where it is
             "update_every": 2,
+            "batch_size": 64,
             "target_sync_updates": 150,
             "capacity": 50_000,
         },

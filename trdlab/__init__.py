@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from trdlab.policies.protocol import Policy
     from trdlab.time_axis import TimeAxis
     from trdlab.training.loading import load
-    from trdlab.verbs import agent, calibrate, compare, explain, fit, solve, train
+    from trdlab.verbs.asking import calibrate, compare, explain
+    from trdlab.verbs.making import agent, fit, solve, train
 
 __version__ = "0.1.0"
 __all__ = [

@@ -94,6 +94,9 @@ def test_nothing_is_replaced_and_what_is_torn_is_named(kept: Path, tmp_path):
     (torn / "weights.safetensors").write_bytes((kept / "weights.safetensors").read_bytes())
     with pytest.raises(TrdlabError, match=r"torn' is torn: The weights are of another network"):
         trdlab.load(torn)
+    (torn / "fit.json").write_text(json.dumps({**data, "schema": "trdlab.fit/9"}))
+    with pytest.raises(TrdlabError, match=r"schema 'trdlab\.fit/9', and this version reads"):
+        trdlab.load(torn)
     (torn / "fit.json").write_text('{"schema": "trdlab.fit/1"}')
     with pytest.raises(TrdlabError, match="does not say what was fitted: it is torn"):
         trdlab.agent(str(torn))

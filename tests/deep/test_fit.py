@@ -172,6 +172,15 @@ def test_each_method_finds_the_exact_components_of_actions_it_never_takes_too(me
     np.testing.assert_allclose(told, true.decomposition.components[:3], atol=0.03 * largest)
 
 
+def test_without_components_the_value_of_the_policy_is_learned():
+    how = FitSettings(learning_rate=0.01, batch_size=1024, most_updates=4_000)
+    fit = Fit(played(steps=60_000), gym.spaces.Discrete(4), TimeAxis(0.9, 0), how)
+    fit.run()
+    told = fit.estimator(FUTURE).decompose(np.arange(3)).value
+    true = exact(walk(), TimeAxis(0.9, 0), policy=POLICY).solution.q_values[:3]
+    np.testing.assert_allclose(told, true, atol=0.03 * np.abs(true).max())
+
+
 def test_the_same_seed_learns_the_same_bits():
     def weights() -> bytes:
         fit = Fit(played(steps=3_000), gym.spaces.Discrete(4), TimeAxis(0.9, 3))

@@ -16,6 +16,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.policies import Policy
 from trdlab.rollouts.playing import Playing
+from trdlab.rollouts.realised import next_flag
 from trdlab.time_axis import TimeAxis
 
 FAR = int(np.iinfo(np.int64).max)
@@ -58,7 +59,7 @@ class Experience:
     @cached_property
     def _next_end(self) -> IntArray:
         """`[M]`: the next step after which nothing is left to come; `FAR` if none is known."""
-        return _next(self.ends)
+        return next_flag(self.ends, FAR)
 
     def ahead(self, rows: IntArray, axis: TimeAxis, most: int | None = None) -> "Ahead":
         """Returns what followed some steps, as far as the policy itself acted after the first.
@@ -225,14 +226,9 @@ def _played(
     *columns, were_forced = (column[order] for column in columns)
     last = np.repeat(lengths.cumsum() - 1, lengths)  # [M]
     first = np.repeat(lengths.cumsum() - lengths, lengths)  # [M]
-    until = np.append(_next(were_forced)[1:], FAR)
+    until = np.append(next_flag(were_forced, FAR)[1:], FAR)
     until = np.where(until < last, until, first + np.repeat(coin, lengths))
     own = None if future.time_limit_ends else playing.environments.time_limit
     limits = [limit for limit in (own, playing.max_steps) if limit is not None]
     until = np.minimum(until, first + min(limits, default=_NEVER))
     return Experience(*(*columns, until, last))
-
-
-def _next(flags: BoolArray) -> IntArray:
-    places = np.where(flags, np.arange(len(flags)), FAR)
-    return np.asarray(np.minimum.accumulate(places[::-1])[::-1])

@@ -298,4 +298,4 @@ def _standardise(network: DecompositionNetwork, observations: Any) -> None:
 
 
 def _tensor(array: Any) -> torch.Tensor:
-    return torch.as_tensor(np.ascontiguousarray(array), dtype=torch.float32)
+    return torch.from_numpy(np.array(array, dtype=np.float32))

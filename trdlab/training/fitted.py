@@ -114,6 +114,11 @@ def load_fit(path: Path) -> tuple["NetworkEstimator", Interface, Whose | None]:
     from trdlab.policies.weights import read_weights
 
     told = read_json(path / FIT)
+    if isinstance(told, dict) and told.get("schema", SCHEMA) != SCHEMA:
+        raise TrdlabError(
+            f"'{path / FIT}' has the schema '{told['schema']}', and this version reads '{SCHEMA}'.",
+            "Fit the agent again, or use the version that wrote it.",
+        )
     try:
         axis, whose = TimeAxis(**told["time_axis"]), told["agent"]
         interface, hidden = (

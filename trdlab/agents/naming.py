@@ -14,9 +14,10 @@ from trdlab.errors import InputError
 from trdlab.gridworld import map_names
 from trdlab.policies import acting
 from trdlab.policies.functions import PYTHON, from_python
+from trdlab.runs.folder import is_fit
 from trdlab.tabular.toytext import toy_text_ids
 from trdlab.time_axis import TimeAxis
-from trdlab.training.fitted import is_fit, load_fit
+from trdlab.training.fitted import load_fit
 
 _OWN_AXIS = "is a run with its own γ, N and w."
 _UNKNOWN_AXIS = "gets γ, N and w when it is fitted."
@@ -78,7 +79,7 @@ def find_agent(
 def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
     """Returns the agent of a fit, in a folder: who was fitted, with what was learned of it."""
     estimator, interface, whose = load_fit(Path(name))
-    if whose is None:
+    if whose.agent is None:
         raise InputError(
             f"'{name}' was fitted to an agent without a name.",
             "Give it in Python: trdlab.agent(trdlab.load(folder), env=…, policy=…).",

@@ -113,10 +113,15 @@ def resume(
     modules: common.Import = None,
     verbose: common.Verbose = False,
 ) -> None:
-    """Go on with a run that was stopped, exactly as if it had not been; or make it longer."""
+    """Go on with a run or a fit that was stopped, as if it had not been; or make a run longer."""
+    from trdlab.cli.fit import go_on
+    from trdlab.runs.folder import is_fit
     from trdlab.training.run import resume as pick_up
 
     path, step = _named(run, checkpoint)
+    if is_fit(path) and step is agent_steps is None:
+        go_on(path)
+        return
     _carry_on(lambda: pick_up(path, step, agent_steps=agent_steps), longer=agent_steps is not None)
 
 

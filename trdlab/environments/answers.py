@@ -52,14 +52,14 @@ def observation_of(env: Any, seed: int, name: str) -> Any:
     return answer[0]
 
 
-def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool]:
-    """Takes an action, and returns observation, reward, terminated, truncated.
+def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool, Any]:
+    """Takes an action, and returns observation, reward, terminated, truncated, info.
 
     Raises:
         InputError: `step` does not return five values, or the reward is no number.
     """
     try:
-        observation, reward, terminated, truncated, _ = env.step(action)
+        observation, reward, terminated, truncated, info = env.step(action)
     except (TypeError, ValueError) as error:
         if "unpack" not in str(error) or not _is_passed_on(error):
             raise
@@ -69,7 +69,7 @@ def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool
             "0.26: 'done' became two.",
         ) from error
     paid = float(reward) if isinstance(reward, int | float) else _number(reward, name)
-    return observation, paid, bool(terminated), bool(truncated)
+    return observation, paid, bool(terminated), bool(truncated), info
 
 
 def _is_passed_on(error: Exception) -> bool:

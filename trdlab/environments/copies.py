@@ -122,7 +122,7 @@ def trace(env: Env, actions: Iterable[int]) -> list[tuple[bytes, bytes, bool, bo
     """Returns what follows actions: observations, rewards and ends, up to the first end."""
     went = []
     for action in actions:
-        observation, reward, terminated, truncated = outcome_of(env, action, _kind(env))
+        observation, reward, terminated, truncated, _ = outcome_of(env, action, _kind(env))
         went.append((_told(observation), _told(reward), terminated, truncated))
         if terminated or truncated:
             break

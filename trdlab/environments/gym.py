@@ -79,6 +79,7 @@ class GymEnvironments:
             self.close()
             raise
         self.shared_chance, self._is_copy = False, False
+        self._infos: dict[int, Any] = {}
         self._proof: Proof | None = None
 
     @aside()
@@ -236,6 +237,7 @@ class GymEnvironments:
         """Returns the same with copies for environments, whose past is not known."""
         other = copy(self)
         other._envs, other.num_envs, other._is_copy = envs, len(envs), True
+        other._infos = {}
         other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
         return other
 
@@ -256,7 +258,7 @@ class GymEnvironments:
 
     def _act(self, env: int, action: int, step: Step) -> None:
         """Takes one environment's action, and fills its row of `step`."""
-        observation, step.rewards[env], terminated, truncated = outcome_of(
+        observation, step.rewards[env], terminated, truncated, self._infos[env] = outcome_of(
             self._envs[env], self._called[action], self.name
         )
         step.frames[env] = self._frame(observation)
@@ -291,4 +293,5 @@ class GymEnvironments:
             truncated=np.zeros(each, dtype=np.bool_),
             life_lost=np.zeros(each, dtype=np.bool_),
             following=self._blank_frames(),
+            info=lambda env: self._infos.get(env) or {},
         )

@@ -1,6 +1,6 @@
 """What a trainer asks of the environments it acts in."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -28,6 +28,10 @@ class NotParallel(InputError):  # noqa: N818  it says what an environment is, no
     """An environment that cannot be made once more while there is another (see `in_batches`)."""
 
 
+def _no_info(env: int) -> Mapping[str, Any]:
+    return {}
+
+
 @dataclass(frozen=True, eq=False)
 class Step:
     """What one step of B environments led to.
@@ -41,6 +45,8 @@ class Step:
         life_lost: `[B]`, whether a life was lost and the episode goes on.
         following: `[B, ...]`, the frame that the next action is chosen at: that of `frames`, or
             the first one of the next episode where one ended.
+        info: from an environment's number to what else it tells of the step, for as long as no
+            other step has been taken.
     """
 
     frames: Frames
@@ -49,6 +55,7 @@ class Step:
     truncated: BoolArray
     life_lost: BoolArray
     following: Frames
+    info: Callable[[int], Mapping[str, Any]] = _no_info
 
     @property
     def ended(self) -> BoolArray:

@@ -14,7 +14,8 @@ from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
 from trdlab.rollouts.playing import Watch, part_of, unwatched, usual_limit
 from trdlab.runs import RunFolder, read_arrays
-from trdlab.training.fitted import is_fit, load_fit
+from trdlab.runs.folder import is_fit
+from trdlab.training.fitted import load_fit
 from trdlab.training.machine import use_threads
 from trdlab.training.setup import future, make_environments
 

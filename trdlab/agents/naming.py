@@ -7,13 +7,17 @@ from typing import Any
 
 from trdlab.agents.agent import Agent
 from trdlab.agents.exact import exact_agent
+from trdlab.agents.given import acting_agent, agent_of
 from trdlab.agents.models import GRIDWORLD, TABULAR, is_model
-from trdlab.agents.outside import file_agent
-from trdlab.agents.places import AXIS, Origin, Where, changed
+from trdlab.agents.places import AXIS, Origin, Where, changed, find_place
+from trdlab.environments.arguments import parse_name
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
 from trdlab.policies import acting
+from trdlab.policies.adapted import About
+from trdlab.policies.files import Options
 from trdlab.policies.functions import PYTHON, from_python
+from trdlab.policies.registry import read_policy
 from trdlab.tabular.toytext import toy_text_ids
 from trdlab.time_axis import TimeAxis
 from trdlab.training.fitted import is_fit, load_fit
@@ -37,7 +41,8 @@ def find_agent(
     That is a run's folder, or `RUN@STEP` for an older checkpoint of it, or `RUN@best` for the one
     of the best score; the folder of a fit; for the exact table of a model, `gridworld:NAME`, a map
     file, or `tabular:ENV_ID`, each with what to make it with after commas, such as
-    `gridworld:ledge,slip=0.2`; a file of an agent that another library trained, or
+    `gridworld:ledge,slip=0.2`; a file of an agent that another library trained, likewise with what
+    it does not say, such as `ppo.zip,activation=relu,greedy=true` (see `Options`); or
     `python:FILE.py:FUNCTION`, whose function makes one.
 
     Args:
@@ -65,7 +70,7 @@ def find_agent(
         own = _UNKNOWN_AXIS if is_file else _OWN_AXIS
         raise InputError(f"'{name}' {own}", _LEAVE_OUT)
     if is_file:
-        return file_agent(name, **where)
+        return _read(name, env, env_arguments)
     if is_fit(Path(name)):
         return _fitted(name, env, env_arguments)
     from trdlab.agents.runs import run_agent
@@ -94,12 +99,26 @@ def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent
 
 def _made(name: str, env: Where | None, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:
     """Returns the agent that a function in a file of Python makes."""
-    from trdlab.agents.given import agent_of
-
     made = agent_of(from_python(name.removeprefix(PYTHON)), env, env_arguments, axis)
     if not isinstance(env, str):
         return made
     return replace(made, origin=Origin(name, env, tuple(env_arguments), None, away=True))
+
+
+def _read(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
+    """Returns the agent in a file of another library, named with what that does not say."""
+    file, arguments = parse_name(name)
+    path = Path(file)
+    policy = read_policy(path, Options.of(arguments))
+    if env is None:
+        about: About = getattr(policy, "about")  # noqa: B009  which every adapter gives
+        raise InputError(
+            f"Nothing says where '{file}' acts: it is a {about.title}.",
+            f"Give its `env`: it needs {about.needs}.",
+        )
+    place = find_place(env, env_arguments, AXIS)
+    agent = acting_agent(policy, place, path.stem)
+    return replace(agent, origin=place.origin(name, None, away=True))
 
 
 def _refuse_model(name: str) -> None:

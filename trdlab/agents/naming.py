@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from trdlab.agents.agent import Agent
-from trdlab.agents.exact import exact_agent
+from trdlab.agents.exact import model_agent
 from trdlab.agents.given import acting_agent, agent_of
-from trdlab.agents.models import GRIDWORLD, TABULAR, is_model
-from trdlab.agents.places import AXIS, Origin, Where, changed, find_place
+from trdlab.agents.models import GRIDWORLD, TABULAR, find_model, is_model
+from trdlab.agents.places import AXIS, Origin, Where, changed, find_place, refuse_arguments
 from trdlab.environments.arguments import parse_name
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
@@ -57,13 +57,9 @@ def find_agent(
         InputError: there is no such agent, or something does not fit it.
         TrdlabError: a run is torn.
     """
-    where: dict[str, Any] = {"env": env, "env_arguments": env_arguments}
-    if name.startswith(PYTHON):
-        return _made(name, env, env_arguments, changed(AXIS, gamma, horizon, width))
-    if is_model(name):
-        called = name if name.startswith((GRIDWORLD, TABULAR)) else f"{GRIDWORLD}{name}"
-        axis = changed(AXIS, gamma, horizon, width)
-        return exact_agent(called, axis, **where)
+    if name.startswith(PYTHON) or is_model(name):
+        made = _made if name.startswith(PYTHON) else _exact
+        return made(name, env, env_arguments, changed(AXIS, gamma, horizon, width))
     _refuse_model(name)
     is_file = Path(name.partition(",")[0]).is_file()
     if (gamma, horizon, width) != (None, None, None):
@@ -77,7 +73,29 @@ def find_agent(
     from trdlab.runs import find_checkpoint
 
     path, step = find_checkpoint(name)
-    return run_agent(path, step=step, **where)
+    return run_agent(path, step=step, env=env, env_arguments=env_arguments)
+
+
+def gridworld_agent(map_name: str, time_axis: TimeAxis, **where: Any) -> Agent:
+    """Returns `find_agent` of a built-in map or a map file, on a time axis."""
+    return find_agent(GRIDWORLD + map_name.removeprefix(GRIDWORLD), **asdict(time_axis), **where)
+
+
+def tabular_agent(env_id: str, time_axis: TimeAxis, **where: Any) -> Agent:
+    """Returns `find_agent` of a Gymnasium environment with a transition table, on a time axis."""
+    return find_agent(TABULAR + env_id.removeprefix(TABULAR), **asdict(time_axis), **where)
+
+
+def _exact(name: str, env: Where | None, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:
+    """Returns the exact table of a model with a name as an agent that acts optimally in it."""
+    called = name if name.startswith((GRIDWORLD, TABULAR)) else f"{GRIDWORLD}{name}"
+    model = find_model(called)
+    if env is None:
+        refuse_arguments(called, env_arguments)
+        return replace(model_agent(model, axis), origin=Origin(called, called, (), axis))
+    place = find_place(env, env_arguments, axis)
+    agent = model_agent(model, axis, place=place)
+    return replace(agent, origin=place.origin(called, axis, away=True))
 
 
 def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:

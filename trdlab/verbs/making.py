@@ -112,8 +112,9 @@ def solve(what: Any, gamma: float = 0.95, horizon: int = 4, width: int = 1) -> "
     """
     import gymnasium as gym
 
-    from trdlab.agents.exact import gridworld_agent, model_agent, tabular_agent
+    from trdlab.agents.exact import model_agent
     from trdlab.agents.models import TABULAR, is_model, model_of
+    from trdlab.agents.naming import gridworld_agent, tabular_agent
     from trdlab.gridworld import map_names
     from trdlab.tabular import from_environment
     from trdlab.tabular.toytext import toy_text_ids

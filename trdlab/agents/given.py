@@ -9,18 +9,19 @@ import gymnasium as gym
 import numpy as np
 
 from trdlab.agents.agent import Agent
-from trdlab.agents.exact import model_agent
 from trdlab.agents.models import Model, model_of
-from trdlab.agents.places import Place, find_place, look
+from trdlab.agents.places import AXIS, Place, find_place, look
 from trdlab.environments.interface import Interface
+from trdlab.environments.naming import is_numbered
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Unfitted
-from trdlab.policies import Policy, ask
+from trdlab.policies import Memoryless, Policy, ask
 from trdlab.policies.adapted import About
 from trdlab.policies.functions import from_function
 from trdlab.policies.registry import policy_of
-from trdlab.tabular import ExactTable
+from trdlab.rollouts.branches import Copying
+from trdlab.tabular import ExactTable, exact
 from trdlab.time_axis import TimeAxis
 
 
@@ -65,6 +66,45 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
         )
     called = getattr(what, "__name__", type(what).__name__)
     return acting_agent(policy or what, place, called.strip("<>"))
+
+
+def model_agent(
+    model: Model,
+    time_axis: TimeAxis = AXIS,
+    *,
+    place: Place | None = None,
+    table: ExactTable | None = None,
+) -> Agent:
+    """Returns the exact table of a model as an agent that acts by its policy.
+
+    Args:
+        model: that of the world.
+        time_axis: γ, N and w.
+        place: where to act instead of in the model.
+        table: the table, if it is solved already; by default that of the optimal policy.
+
+    Raises:
+        InputError: what is seen or can be done in the place is something else.
+    """
+    world, names = model.world, model.world.action_names
+    if place is None:
+        place = find_place(model, (), time_axis)
+    else:
+        own, found = gym.spaces.Discrete(world.mdp.num_states), look(place.make)
+        Interface(own, names).check_fits(found, place.name)
+        names = found.action_names if is_numbered(names) else names
+    solved = exact(world.mdp, time_axis) if table is None else table
+    policy = solved.solution.policy
+    return Agent(
+        name=model.name,
+        estimator=solved,
+        action_names=names,
+        make=place.make,
+        policy=Memoryless(lambda states: policy[states]),
+        world=world,
+        is_away=not place.is_model(solved.mdp),
+        copying=Copying(episodes=100),
+    )
 
 
 def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, name: str) -> Agent:

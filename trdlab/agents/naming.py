@@ -1,4 +1,4 @@
-"""What a word names: a run, a checkpoint of it, or the exact table of a model."""
+"""What a word names: a run, a fit, a file of another library, or the exact table of a model."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -6,11 +6,21 @@ from pathlib import Path
 from typing import Any
 
 from trdlab.agents.agent import Agent
-from trdlab.agents.exact import model_agent
-from trdlab.agents.given import acting_agent, agent_of
+from trdlab.agents.given import acting_agent, agent_of, model_agent
 from trdlab.agents.models import GRIDWORLD, TABULAR, find_model, is_model
-from trdlab.agents.places import AXIS, Origin, Where, changed, find_place, refuse_arguments
+from trdlab.agents.places import (
+    AXIS,
+    Origin,
+    Where,
+    changed,
+    find_place,
+    look,
+    place_of,
+    refuse_arguments,
+)
 from trdlab.environments.arguments import parse_name
+from trdlab.environments.making import check_imported
+from trdlab.environments.naming import is_numbered
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
 from trdlab.policies import acting
@@ -18,6 +28,7 @@ from trdlab.policies.adapted import About
 from trdlab.policies.files import Options
 from trdlab.policies.functions import PYTHON, from_python
 from trdlab.policies.registry import read_policy
+from trdlab.runs import RunFolder, find_checkpoint
 from trdlab.tabular.toytext import toy_text_ids
 from trdlab.time_axis import TimeAxis
 from trdlab.training.fitted import is_fit, load_fit
@@ -69,11 +80,7 @@ def find_agent(
         return _read(name, env, env_arguments)
     if is_fit(Path(name)):
         return _fitted(name, env, env_arguments)
-    from trdlab.agents.runs import run_agent
-    from trdlab.runs import find_checkpoint
-
-    path, step = find_checkpoint(name)
-    return run_agent(path, step=step, env=env, env_arguments=env_arguments)
+    return _run(name, env, env_arguments)
 
 
 def gridworld_agent(map_name: str, time_axis: TimeAxis, **where: Any) -> Agent:
@@ -96,6 +103,39 @@ def _exact(name: str, env: Where | None, env_arguments: Sequence[str], axis: Tim
     place = find_place(env, env_arguments, axis)
     agent = model_agent(model, axis, place=place)
     return replace(agent, origin=place.origin(called, axis, away=True))
+
+
+def _run(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
+    """Returns the agent of a run, or of a checkpoint of it, in its own environments or others."""
+    from trdlab.training.loading import interface_of, load, run_settings
+    from trdlab.training.machine import use_threads
+
+    path, step = find_checkpoint(name)
+    folder = RunFolder.open(path)
+    settings = run_settings(folder)
+    if env_arguments and env is None:
+        raise InputError("The run says what its environment is made with.", "Give `env` too.")
+    use_threads(settings)
+    estimator = load(path, step)
+    if env is None:
+        check_imported(settings.env)
+        place = place_of(settings)
+    else:
+        games = settings.kind == "atari"
+        place = find_place(env, env_arguments, settings.time_axis, games=games)
+    found, known = look(place.make), interface_of(folder)
+    known.check_fits(found, place.name)
+    at = "" if step is None else f"@{step}"
+    module = settings.env.rpartition(":")[0]
+    return Agent(
+        name=f"{folder.path.name}{at}",
+        estimator=estimator,
+        action_names=(known if is_numbered(found.action_names) else found).action_names,
+        make=place.make,
+        seconds_per_step=found.seconds_per_step,
+        origin=place.origin(f"{path}{at}", None, away=env is not None, module=module),
+        copying=place.copying,
+    )
 
 
 def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
@@ -141,13 +181,10 @@ def _read(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
 
 def _refuse_model(name: str) -> None:
     """Refuses the name of a model without its kind, where no run is called that."""
-    called = name.partition(",")[0]
-    if Path(name).exists():
-        return
-    if called in map_names():
-        raise InputError(f"There is no run '{name}'.", f"For the map: {GRIDWORLD}{name}")
-    if called in toy_text_ids():
-        raise InputError(f"There is no run '{name}'.", f"For the exact table: {TABULAR}{name}")
+    kinds = (("map", GRIDWORLD, map_names()), ("exact table", TABULAR, toy_text_ids()))
+    for what, kind, known in kinds:
+        if name.partition(",")[0] in known and not Path(name).exists():
+            raise InputError(f"There is no run '{name}'.", f"For the {what}: {kind}{name}")
 
 
 def find_pair(

@@ -112,7 +112,7 @@ def solve(what: Any, gamma: float = 0.95, horizon: int = 4, width: int = 1) -> "
     """
     import gymnasium as gym
 
-    from trdlab.agents.exact import model_agent
+    from trdlab.agents.given import model_agent
     from trdlab.agents.models import TABULAR, is_model, model_of
     from trdlab.agents.naming import gridworld_agent, tabular_agent
     from trdlab.gridworld import map_names
@@ -164,7 +164,7 @@ def train(
         InputError: there is no such environment, preset or setting, or a value cannot be used.
         OutputError: the folder exists, or cannot be written.
     """
-    from trdlab.agents.runs import run_agent
+    from trdlab.agents.naming import find_agent
     from trdlab.training.run import begin, carry_on
     from trdlab.training.setup import read_settings
 
@@ -180,7 +180,7 @@ def train(
     with begin(chosen, None if out is None else Path(out)) as run:
         carry_on(run, on_metrics=on_metrics)
         path = run.folder.path
-    return run_agent(path)
+    return find_agent(str(path))
 
 
 def fit(

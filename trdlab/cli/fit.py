@@ -30,10 +30,7 @@ def _seconds(text: str | None) -> float | None:
 
 def fit(
     agent: Annotated[str, typer.Argument(metavar="AGENT", help=common.AGENT)],
-    env: Annotated[
-        str | None,
-        typer.Option("--env", help="Where it acts.", show_default="where it was made for"),
-    ] = None,
+    env: common.Env = None,
     env_arguments: common.EnvArguments = None,
     horizon: Annotated[int, typer.Option("--N", help="Number of explicit components.")] = 40,
     width: Annotated[int, typer.Option("--w", help="Steps in each component.")] = 1,
@@ -73,7 +70,7 @@ def fit(
     seconds = _seconds(limit)
     found = trdlab.agent(agent, env=env, env_arguments=_given(env_arguments))
     out = out or free_name(Path("fits"), f"{found.name}-N{horizon}-w{width}")
-    errors, watch = Console(stderr=True, highlight=False), _Watch(steps)
+    errors, watch = common.errors(), _Watch(steps)
     began = time.monotonic()
     fitted = trdlab.fit(
         found,

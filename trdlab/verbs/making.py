@@ -225,7 +225,7 @@ def fit(
 
     from trdlab.deep.experience import gather
     from trdlab.deep.fit import Fit, FitSettings
-    from trdlab.estimator import Future, Unfitted
+    from trdlab.estimator import Future
     from trdlab.policies import acting
     from trdlab.rollouts.playing import usual_limit
     from trdlab.time_axis import TimeAxis
@@ -237,7 +237,7 @@ def fit(
     policy = acting(frozen.policy or frozen.estimator)
     own = getattr(policy, "gamma", None)
     if own is None:
-        own = 0.99 if isinstance(frozen.estimator, Unfitted) else frozen.estimator.time_axis.gamma
+        own = frozen.estimator.time_axis.gamma if frozen.is_fitted else 0.99
     axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)
     experience = gather(
         frozen.make,

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from trdlab.cli import common
 
@@ -82,8 +81,7 @@ def compare(
         from trdlab.show.plots.style import check_pictures
 
         check_pictures([out / NAME])
-    errors = Console(stderr=True, highlight=False)
-    with EpisodeProgress(errors, "Getting ready") as progress:
+    with EpisodeProgress(common.errors(), "Getting ready") as progress:
         found = two.compare(
             *agents, episodes=episodes, max_steps=max_steps, seed=seed, watch=progress.on_progress
         )

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from trdlab.cli import common
 from trdlab.errors import InputError
@@ -29,10 +28,7 @@ def _seconds(text: str | None) -> float | None:
 
 def fit(
     agent: Annotated[str, typer.Argument(metavar="AGENT", help=common.AGENT)],
-    env: Annotated[
-        str | None,
-        typer.Option("--env", help="Where it acts.", show_default="where it was made for"),
-    ] = None,
+    env: common.Env = None,
     env_arguments: common.EnvArguments = None,
     horizon: Annotated[int, typer.Option("--N", help="Number of explicit components.")] = 40,
     width: Annotated[int, typer.Option("--w", help="Steps in each component.")] = 1,
@@ -125,7 +121,7 @@ def _fit(found: "Agent", out: Path, **how: Any) -> None:
     from trdlab.runs import RunFolder
     from trdlab.training.fitted import Stopped
 
-    errors, began = Console(stderr=True, highlight=False), time.monotonic()
+    errors, began = common.errors(), time.monotonic()
     with stopping() as stop:
         try:
             fitted = trdlab.fit(found, out=out, progress=True, should_stop=stop, **how)

@@ -141,15 +141,10 @@ def evaluate(
             show_default="as configured",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")] = 1000,
+    seed: common.EpisodesSeed = 1000,
     max_steps: Annotated[
         int | None,
-        typer.Option(
-            "--max-steps",
-            min=1,
-            help="After which an episode is cut off, if not before.",
-            show_default="the environment's limit, or else 1000 or four horizons",
-        ),
+        common.max_steps_option("the environment's limit, or else 1000 or four horizons"),
     ] = None,
     checkpoint: Checkpoint = None,
     modules: common.Import = None,
@@ -247,7 +242,7 @@ def _carry_on(
     )
     from trdlab.training.run import carry_on
 
-    errors = _errors()
+    errors = common.errors()
     with stopping() as stop, open_run() as run:
         path, settings = run.folder.path, run.trainer.settings
         go_on = f"Go on: {run.folder.resume_command}"
@@ -300,7 +295,7 @@ def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
     from trdlab.show.training import evaluation_page
     from trdlab.training.loading import evaluate_run
 
-    errors = _errors()
+    errors = common.errors()
     with EpisodeProgress(errors) as progress:
         result, kept = evaluate_run(path, **how, watch=progress.on_progress)
     if as_json:
@@ -319,7 +314,7 @@ def _compare_with_chance(
     from trdlab.show.training import chance_line
     from trdlab.training.loading import evaluate_run
 
-    errors = _errors()
+    errors = common.errors()
     with EpisodeProgress(errors) as progress:
         chance, _ = evaluate_run(folder.path, epsilon=1.0, watch=progress.on_progress)
     more = f"{folder.resume_command} --agent-steps {2 * settings.agent_steps}"
@@ -328,10 +323,6 @@ def _compare_with_chance(
         cure += ", such as --epsilon-hold 10"
     if line := chance_line(result, chance, f"{cure}."):
         _say(errors, line)
-
-
-def _errors() -> Console:
-    return Console(stderr=True, highlight=False)
 
 
 def _say(console: Console, text: str) -> None:

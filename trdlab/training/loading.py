@@ -4,15 +4,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
-from trdlab.environments import Environments, in_batches
+from trdlab.environments import Environments
 from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.files import check_own, write_json
-from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
-from trdlab.rollouts.playing import Watch, part_of, unwatched, usual_limit
+from trdlab.rollouts.evaluation import Evaluation, score
+from trdlab.rollouts.playing import Watch, unwatched, usual_limit
 from trdlab.runs import RunFolder, read_arrays
 from trdlab.runs.folder import is_fit
 from trdlab.training.fitted import load_fit
@@ -124,32 +123,25 @@ def evaluate_run(
         raise InputError(f"`epsilon` is {chance}.", "It lies from 0 to 1.")
     step, estimator = _loaded(folder, step)
     count = episodes or settings.evaluate_episodes or 30
-    parts: list[Evaluation] = []
 
     def make(num_envs: int, seed: int) -> Environments:
-        return make_environments(settings, num_envs=num_envs, seed=seed)
-
-    for environments in in_batches(make, count, seed):
+        environments = make_environments(settings, num_envs=num_envs, seed=seed)
         interface_of(folder).check_fits(Interface.of(environments), settings.env)
-        parts.append(
-            evaluate(
-                estimator,
-                environments,
-                epsilon=chance,
-                seed=seed + len(parts),  # a single batch, where there can be one
-                max_steps=_limit(environments, max_steps, settings.time_axis),
-                watch=part_of(watch, sum(len(of.returns) for of in parts), count),
-            )
-        )
-    result = joined(parts)
+        return environments
+
+    result = score(
+        estimator,
+        make,
+        count,
+        epsilon=chance,
+        max_steps=max_steps,
+        enough=usual_limit(settings.time_axis),
+        seed=seed,
+        watch=watch,
+    )
     limit = f"-max-steps-{max_steps}" if max_steps else ""
     name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}{limit}.json"
     return result, _keep(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
-
-
-def _limit(environments: Environments, given: int | None, axis: TimeAxis) -> int | None:
-    """Returns the steps after which to cut an episode off; None where the environment does."""
-    return given if given or environments.time_limit else usual_limit(axis)
 
 
 def _keep(path: Path, data: dict[str, Any]) -> Path | OutputError:

@@ -113,8 +113,9 @@ def solve(what: Any, gamma: float = 0.95, horizon: int = 4, width: int = 1) -> "
     """
     import gymnasium as gym
 
-    from trdlab.agents.exact import gridworld_agent, model_agent, tabular_agent
+    from trdlab.agents.given import model_agent
     from trdlab.agents.models import TABULAR, is_model, model_of
+    from trdlab.agents.naming import gridworld_agent, tabular_agent
     from trdlab.gridworld import map_names
     from trdlab.tabular import from_environment
     from trdlab.tabular.toytext import toy_text_ids
@@ -164,7 +165,7 @@ def train(
         InputError: there is no such environment, preset or setting, or a value cannot be used.
         OutputError: the folder exists, or cannot be written.
     """
-    from trdlab.agents.runs import run_agent
+    from trdlab.agents.naming import find_agent
     from trdlab.training.run import begin, carry_on
     from trdlab.training.setup import read_settings
 
@@ -180,7 +181,7 @@ def train(
     with begin(chosen, None if out is None else Path(out)) as run:
         carry_on(run, on_metrics=on_metrics)
         path = run.folder.path
-    return run_agent(path)
+    return find_agent(str(path))
 
 
 def fit(
@@ -235,7 +236,7 @@ def fit(
     from trdlab.deep.experience import Experience, gather
     from trdlab.deep.fit import Fit
     from trdlab.deep.fit_settings import FitSettings
-    from trdlab.estimator import Future, Unfitted
+    from trdlab.estimator import Future
     from trdlab.policies import acting
     from trdlab.rollouts.outcomes import Outcomes
     from trdlab.rollouts.playing import usual_limit
@@ -247,7 +248,7 @@ def fit(
     policy = acting(frozen.policy or frozen.estimator)
     own = getattr(policy, "gamma", None)
     if own is None:
-        own = 0.99 if isinstance(frozen.estimator, Unfitted) else frozen.estimator.time_axis.gamma
+        own = frozen.estimator.time_axis.gamma if frozen.is_fitted else 0.99
     axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)
     read, made_of = Outcomes(dict(parts or {}) | dict(outcomes or {})), tuple(parts or ())
     folder, of = None, frozen.origin

@@ -185,11 +185,13 @@ def _moment(explanation: Explanation) -> dict[str, Any] | None:
     choice = explanation.choice
     if choice is None:
         return None
-    known = ("error", "foil_error", "only_reward")
+    own, foils = choice.moment.calibration, choice.moment.foils
     return {
         "state": explanation.state,
         "actions": actions_data(choice.moment),
-        **{name: plain_data(getattr(choice.moment, name)) for name in known},
+        "error": None if own is None else plain_data(own.off_by),
+        "foil_error": None if foils is None else plain_data(foils.off_by),
+        "only_reward": choice.moment.only_reward,
         "action": choice.action,
         "foil": choice.foil,
     }

@@ -60,7 +60,7 @@ def compare(
     """
     from trdlab.agents.naming import find_pair
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explanations.comparison import comparing as two
+    from trdlab.explanations.comparison import comparison as two
 
     agents = find_pair(
         (first, second),
@@ -100,7 +100,7 @@ def _further(found: "Comparison") -> str:
     """Returns the command that explains the moment at which the two are furthest apart, if any."""
     visits = found.visits
     for m in visits.furthest(1):
-        if words := found.words[visits.player[m]]:
+        if (origin := found.agents[visits.player[m]].origin) is not None:
             where = {"--seed": str(visits.seed[m]), "--step": str(visits.step[m])}
-            return common.command(["explain", *words], where)
+            return common.command(["explain", *origin.words], where)
     return ""

@@ -27,7 +27,7 @@ def run_agent(
     env: Where | None = None,
     env_arguments: Sequence[str] = (),
 ) -> Agent:
-    """Returns the agent of a run, or of its checkpoint at an older agent step.
+    """Returns the agent of a run, or of its checkpoint at some agent step.
 
     It acts in the environments it was trained in, or in others that fit (see `find_agent`).
 

@@ -50,12 +50,12 @@ def find_agent(
 ) -> Agent:
     """Returns an agent by its name.
 
-    That is a run's folder, or `RUN@STEP` for an older checkpoint of it, or `RUN@best` for the one
-    of the best score; the folder of a fit; for the exact table of a model, `gridworld:NAME`, a map
-    file, or `tabular:ENV_ID`, each with what to make it with after commas, such as
-    `gridworld:ledge,slip=0.2`; a file of an agent that another library trained, likewise with what
-    it does not say, such as `ppo.zip,activation=relu,greedy=true` (see `Options`); or
-    `python:FILE.py:FUNCTION`, whose function makes one.
+    That is a run's folder, or `RUN@STEP` or `RUN@best` for another checkpoint of it; the folder of
+    a fit; for the exact table of a model, `gridworld:NAME`, a map file, or `tabular:ENV_ID`, each
+    with what to make it with after commas, such as `gridworld:ledge,slip=0.2`; a file of an agent
+    that another library trained, likewise with what it does not say, such as
+    `ppo.zip,activation=relu,greedy=true` (see `Options`); or `python:FILE.py:FUNCTION`, whose
+    function makes one.
 
     Args:
         name: of the agent.

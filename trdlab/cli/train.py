@@ -51,10 +51,15 @@ RunPath = Annotated[
         metavar="RUN", help="The run's folder; RUN@STEP or RUN@best for another checkpoint."
     ),
 ]
-Checkpoint = Annotated[
-    int | None,
-    typer.Option("--checkpoint", metavar="STEP", help="An older one.", show_default="the newest"),
-]
+
+
+def _checkpoint(shown: str) -> Any:
+    """Returns the option that names a checkpoint."""
+    return typer.Option("--checkpoint", metavar="STEP", help="Another one.", show_default=shown)
+
+
+Newest = Annotated[int | None, _checkpoint("the newest")]
+OfAgent = Annotated[int | None, _checkpoint("that of the run's agent")]
 
 
 @train.command(name="gym")
@@ -103,7 +108,7 @@ def train_atari(
 
 def resume(
     run: RunPath,
-    checkpoint: Checkpoint = None,
+    checkpoint: Newest = None,
     agent_steps: Annotated[
         int | None,
         typer.Option(
@@ -146,7 +151,7 @@ def evaluate(
         int | None,
         common.max_steps_option("the environment's limit, or else 1000 or four horizons"),
     ] = None,
-    checkpoint: Checkpoint = None,
+    checkpoint: OfAgent = None,
     modules: common.Import = None,
     as_json: common.AsJson = False,
     verbose: common.Verbose = False,
@@ -272,7 +277,8 @@ def _carry_on(
             _say(errors, go_on)
             raise typer.Exit(stop.code or 0)
     _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
-    if line := best_line(path, steps, best_step(run.folder)):
+    best, episodes = best_step(run.folder), settings.checkpoint_episodes
+    if line := best_line(path, steps, best, episodes=episodes):
         _say(errors, line)
     if settings.evaluate_episodes:
         _compare_with_chance(run.folder, _evaluate(path), settings)

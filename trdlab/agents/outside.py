@@ -11,6 +11,7 @@ import numpy as np
 from trdlab.agents.agent import Agent
 from trdlab.agents.places import AXIS, Place, Where, find_place
 from trdlab.environments.arguments import parse_name
+from trdlab.environments.flat import FlatSpace
 from trdlab.environments.interface import Interface
 from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
@@ -18,7 +19,7 @@ from trdlab.estimator import Unfitted
 from trdlab.policies import Policy, ask
 from trdlab.policies.adapted import About
 from trdlab.policies.files import Options
-from trdlab.policies.functions import from_function
+from trdlab.policies.functions import as_they_are, from_function
 from trdlab.policies.registry import read_policy
 
 
@@ -52,7 +53,8 @@ def policy_agent(who: Policy | Callable[[Any], Any], place: Place, name: str) ->
     """Returns the agent by which a policy, or a function, acts somewhere.
 
     Args:
-        who: a policy; or a function, see `from_function`.
+        who: a policy; or a function, see `from_function`. A function is shown a Dict or Tuple of
+            observations as such, a policy as one vector (see `FlatSpace`).
         place: where.
         name: what to call it.
 
@@ -65,7 +67,8 @@ def policy_agent(who: Policy | Callable[[Any], Any], place: Place, name: str) ->
     count = len(found.action_names)
     policy = who
     if not isinstance(policy, Policy):
-        policy = from_function(policy, np.repeat(first.observations, 2, axis=0), count)
+        shown = found.space.unflat if isinstance(found.space, FlatSpace) else as_they_are
+        policy = from_function(policy, np.repeat(first.observations, 2, axis=0), count, shown)
     about = getattr(policy, "about", None)
     if isinstance(about, About):
         about.check_fits(found, place.name, name)

@@ -53,7 +53,7 @@ $(VENV)/installed: $(VENV)/python pyproject.toml
 	touch $@
 
 $(VENV)/installed-tests: $(VENV)/installed
-	$(PIP) -e '.[test,docs]'
+	$(PIP) -e '.[test,docs,interop]'
 	touch $@
 
 LOWEST_PIP := $(VENV)-lowest/bin/python -m pip install --quiet --disable-pip-version-check

@@ -238,7 +238,11 @@ def test_other_observations_stay_as_they_are(space, stack):
             "The slip probability is 2. It must lie between 0 and 1.",
         ),
         ("Pendulum-v1", {}, "The action space of Pendulum-v1 is Box(-2.0, 2.0, (1,), float32)"),
-        ("Blackjack-v1", {}, "through gymnasium.wrappers.FlattenObservation."),
+        (
+            "Counter-v0",
+            {"observation_space": gym.spaces.Dict(say=gym.spaces.Text(9))},
+            "Use one of numbers: Box, Discrete, MultiDiscrete, MultiBinary, or a Dict or Tuple of",
+        ),
         ("ALE/Breakout-v5", {}, "is an Atari game. Use: trdlab train atari ALE/Breakout-v5"),
     ],
 )
@@ -247,6 +251,58 @@ def test_refused_in_one_line_with_the_cure(env_id, arguments, message):
         GymEnvironments(env_id, seed=0, env_arguments=arguments)
     assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_parts_of_an_observation_stand_one_behind_the_other():
+    picture = gym.spaces.Box(0, 255, (2, 5, 3), np.uint8)
+    space = gym.spaces.Dict(
+        [  # not in the order of the alphabet
+            ("z", picture),
+            ("a", gym.spaces.Tuple([gym.spaces.Discrete(3, start=-1), gym.spaces.Box(-1, 1)])),
+            ("m", gym.spaces.MultiDiscrete([2, 3])),
+            ("b", gym.spaces.MultiBinary((2, 2))),
+        ]
+    )
+    environments = GymEnvironments("Counter-v0", seed=0, env_arguments={"observation_space": space})
+    seen = {
+        "z": np.arange(30, dtype=np.uint8).reshape(2, 5, 3),
+        "a": (np.int64(1), np.float32([0.5])),
+        "m": np.array([1, 0]),
+        "b": np.array([[0, 1], [1, 1]], dtype=np.int8),
+    }
+    flat = environments.observation_space
+    ours = environments._frame(seen)
+    assert ours.dtype == np.float32
+    assert ours[:10].tolist() == list(range(0, 30, 3))  # a channel after the other
+    assert ours[30:].tolist() == [0, 0, 1, 0.5, 0, 1, 1, 0, 0, 0, 1, 1, 1]
+    assert flat.parts == {"z": (3, 2, 5), "a": (4,), "m": (5,), "b": (2, 2)}
+    back = flat.unflat(ours[None])
+    assert np.array_equal(back["z"][0], np.moveaxis(seen["z"], -1, 0))
+    assert [part.tolist() for part in (*back["a"], back["m"], back["b"])] == [
+        [1],
+        [[0.5]],
+        [[1, 0]],
+        [[[0, 1], [1, 1]]],
+    ]
+    assert (flat.low[0], flat.high[0], flat.shape) == (0.0, 255.0, (43,))
+    assert environments.reset().shape == (1, 43)
+    assert environments.step(np.array([0])).frames.shape == (1, 43)
+
+
+@pytest.mark.parametrize("seen", [{}, {"at": [0.0, 1.0]}, {"at": "here"}, [0.5]])
+def test_what_is_none_of_its_parts_is_refused(seen):
+    space = gym.spaces.Dict(at=gym.spaces.Box(-1, 1))
+    environments = GymEnvironments("Counter-v0", seed=0, env_arguments={"observation_space": space})
+    wrong = r"gives an observation that is none of its observation space Dict\('at'.*is wrong"
+    with pytest.raises(InputError, match=wrong):
+        environments._frame(seen)
+
+
+def test_copies_are_made_of_environments_that_show_several_parts():
+    environments = GymEnvironments("Blackjack-v1", 2, seed=0)
+    assert environments.reset().shape == (2, 32 + 11 + 2)
+    copies = environments.branch(np.array([0, 1, 1]), seed=1)
+    assert copies.step(np.array([0, 0, 0])).terminated.all()
 
 
 def test_a_missing_extra_is_named(monkeypatch):

@@ -150,7 +150,6 @@ def broken():
         ),
         (partial(gym.make, "Pendulum-v1"), "The action space of Pendulum-v1 is Box(-2.0, 2.0"),
         (gym.make("Pendulum-v1"), "The action space of Pendulum-v1 is Box(-2.0, 2.0"),
-        (gym.make("Blackjack-v1"), "observation space of Blackjack-v1: Tuple(Discrete(32), Disc"),
     ],
 )
 def test_what_is_no_environment_is_refused_by_what_is_missing(env, message):

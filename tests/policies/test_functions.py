@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import trdlab
+from doors import Doors
 from trdlab.errors import InputError
 from trdlab.policies import Likeliest, Memoryless, ask
 from trdlab.policies.functions import OneByOne, from_function
@@ -91,6 +92,31 @@ def test_an_agent_without_expectations_plays_and_says_what_is_missing():
             ask_it()
     with pytest.raises(InputError, match="There are 0 episodes"):
         agent.evaluate(0)
+
+
+def test_a_function_is_shown_the_parts_of_an_observation():
+    def one(seen):
+        assert sorted(seen) == ["open", "time"]
+        return int(np.flatnonzero(seen["open"])[-1])
+
+    def all_together(seen):
+        return np.eye(3)[2 - seen["open"][:, ::-1].argmax(axis=1)]
+
+    agents = [trdlab.agent(who, env=Doors) for who in (one, all_together)]
+    assert isinstance(agents[0].policy, OneByOne)
+    returns = [agent.evaluate(5, seed=2).returns.tolist() for agent in agents]
+    assert returns[0] == returns[1]
+    assert min(returns[0]) > 6
+    cards = trdlab.agent(lambda hand: int(hand[0] < 18), env="Blackjack-v1")  # a Tuple
+    assert cards.evaluate(20).mean.value > -0.8
+
+
+def test_what_is_expected_of_observations_with_parts_is_fitted():
+    agent = trdlab.agent(lambda seen: int(np.flatnonzero(seen["open"])[-1]), env=Doors)
+    fitted = trdlab.fit(agent, horizon=2, steps=300, share=0.0, most_updates=200)
+    seen = np.float32([[1, 1, 1, 0.5], [1, 1, 0, 0.5]])  # the doors, and the time
+    told = fitted.estimator.decompose(seen).components[[0, 1], [2, 1], 0]
+    np.testing.assert_allclose(told, [2.0, 1.0], atol=0.3)
 
 
 def test_a_policy_with_memory_is_taken_as_it_is():

@@ -1,9 +1,8 @@
 """Archives and loaded models act as the libraries that made them say: the same to the last action.
 
-Needs the extra `interop`; without it these tests are skipped.
+Needs the extra `interop`, which `make test` installs; without it these tests are skipped.
 """
 
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -17,8 +16,10 @@ contrib = pytest.importorskip("sb3_contrib", reason="needs pip install 'trdlab[i
 import torch  # noqa: E402
 
 import trdlab  # noqa: E402
+from doors import Doors  # noqa: E402
+from trdlab.environments.spaces import frame_space  # noqa: E402
 from trdlab.policies import ask  # noqa: E402
-from trdlab.policies.files import Options, open_agent  # noqa: E402
+from trdlab.policies.files import Options  # noqa: E402
 from trdlab.policies.live import adapt as adapt_live  # noqa: E402
 from trdlab.policies.registry import read_policy  # noqa: E402
 
@@ -41,9 +42,19 @@ class Seen(gym.Env):
 
 
 VECTOR = gym.spaces.Box(-3, 3, (5,))
-IMAGE = gym.spaces.Box(0, 255, (40, 44, 3), np.uint8)
+IMAGE = gym.spaces.Box(0, 255, (36, 40, 3), np.uint8)
 BOARD = gym.spaces.Box(-3, 3, (2, 3))
 STATES = gym.spaces.Discrete(7)
+PARTS = gym.spaces.Dict(
+    {
+        "of": gym.spaces.MultiDiscrete([2, 3]),
+        "at": gym.spaces.Box(-3, 3, (2, 2), np.float64),
+        "on": gym.spaces.MultiBinary(3),
+        "state": STATES,
+    }
+)
+PICTURED = gym.spaces.Dict({"seen": IMAGE, "at": VECTOR, "act": VECTOR})
+BACKWARDS = gym.spaces.Dict([("z", VECTOR), ("it's, Box(", IMAGE), ("a", STATES)])
 RELU = {"activation_fn": torch.nn.ReLU, "net_arch": [8]}
 OFF_POLICY = {"buffer_size": 10, "learning_starts": 1}
 LSTM = {"lstm_hidden_size": 8}
@@ -87,6 +98,22 @@ CASES = {
     "RecurrentPPO of images": (
         contrib.RecurrentPPO, "CnnLstmPolicy", IMAGE, {"policy_kwargs": LSTM}
     ),
+    "DQN of parts": (sb3.DQN, "MultiInputPolicy", PARTS, OFF_POLICY),
+    "DQN of parts with images": (sb3.DQN, "MultiInputPolicy", PICTURED, OFF_POLICY),
+    "QR-DQN of parts": (
+        contrib.QRDQN, "MultiInputPolicy", PARTS, OFF_POLICY | {"policy_kwargs": {"n_quantiles": 5}}
+    ),
+    "PPO of parts": (sb3.PPO, "MultiInputPolicy", PARTS, {}),
+    "PPO of parts with images": (sb3.PPO, "MultiInputPolicy", PICTURED, {}),
+    "PPO of parts, not in order": (sb3.PPO, "MultiInputPolicy", BACKWARDS, {}),
+    "PPO of parts, not divided": (
+        sb3.PPO, "MultiInputPolicy", PICTURED, {"policy_kwargs": {"normalize_images": False}}
+    ),
+    "A2C of parts": (sb3.A2C, "MultiInputPolicy", PARTS, {}),
+    "MaskablePPO of parts": (contrib.MaskablePPO, "MultiInputPolicy", PICTURED, {}),
+    "RecurrentPPO of parts": (
+        contrib.RecurrentPPO, "MultiInputLstmPolicy", PICTURED, {"policy_kwargs": LSTM}
+    ),
 }  # fmt: skip
 
 
@@ -100,14 +127,25 @@ def model(request) -> Any:
     return request.param.partition(" of ")[0].partition(",")[0], made, space
 
 
-def drawn(space: gym.Space[Any], count: int) -> np.ndarray:
+def drawn(space: gym.Space[Any], count: int) -> list[Any]:
     space.seed(4)
-    return np.stack([space.sample() for _ in range(count)])
+    return [space.sample() for _ in range(count)]
 
 
-def as_shown(observations: np.ndarray) -> np.ndarray:
-    """Returns observations as our environments show them: images channels first."""
-    return np.moveaxis(observations, -1, 1) if observations.ndim == 4 else observations
+def together(observations: list[Any]) -> Any:
+    """Returns a batch of observations, as the library takes it."""
+    if isinstance(observations[0], dict):
+        return {key: np.stack([of[key] for of in observations]) for key in observations[0]}
+    return np.stack(observations)
+
+
+def as_shown(space: gym.Space[Any], observations: list[Any]) -> np.ndarray:
+    """Returns observations as our environments show them: images channels first, parts flat."""
+    if isinstance(space, gym.spaces.Dict):
+        flat = frame_space(space, "here")
+        return np.stack([flat.flat(observation) for observation in observations])
+    batch = np.stack(observations)
+    return np.moveaxis(batch, -1, 1) if batch.ndim == 4 else batch
 
 
 def theirs(model: Any, observations: np.ndarray, state: Any, begins: np.ndarray) -> np.ndarray:
@@ -121,7 +159,7 @@ def theirs(model: Any, observations: np.ndarray, state: Any, begins: np.ndarray)
         if not hasattr(model.policy, "lstm_actor"):
             return model.policy.get_distribution(seen).distribution.probs.numpy(), None
         lstm = model.policy.lstm_actor
-        blank = torch.zeros(lstm.num_layers, len(observations), lstm.hidden_size)
+        blank = torch.zeros(lstm.num_layers, len(begins), lstm.hidden_size)
         state = (blank, blank) if state is None else state
         told, state = model.policy.get_distribution(seen, state, torch.tensor(begins).float())
         return told.distribution.probs.numpy(), state
@@ -132,16 +170,19 @@ def test_every_algorithm_acts_as_its_library_says(model, live, tmp_path):
     name, made, space = model
     made.save(tmp_path / "agent")
     policy = adapt_live(made) if live else read_policy(tmp_path / "agent.zip", Options())
-    observations = drawn(space, 60).reshape(10, 6, *space.shape)
+    observations = drawn(space, 1000)
+    starts = np.random.default_rng(5).random((50, 20)) < 0.05  # [T, B], of later episodes
     mine, their = None, None
-    for step, seen in enumerate(observations):
-        begins = np.array([step == 0, step == 0, step % 3 == 0, step == 4, step == 0, step == 7])
+    for step, begins in enumerate(starts):
         begins |= step == 0
-        told, their = theirs(made, seen, their, begins)
-        likely, mine = ask(policy, as_shown(seen), mine, begins)
-        own = policy.q_values(as_shown(seen)) if hasattr(policy, "q_values") else likely
-        np.testing.assert_allclose(own, told, rtol=2e-5, atol=2e-6)
-        np.testing.assert_array_equal(likely.argmax(axis=1), told.argmax(axis=1))
+        batch = observations[20 * step : 20 * step + 20]
+        told, their = theirs(made, together(batch), their, begins)
+        shown = as_shown(space, batch)
+        likely, mine = ask(policy, shown, mine, begins)
+        own = policy.q_values(shown) if hasattr(policy, "q_values") else likely
+        np.testing.assert_allclose(own, told, rtol=2e-5, atol=5e-5)
+        chosen = np.take_along_axis(told, likely.argmax(axis=1)[:, None], axis=1)[:, 0]
+        np.testing.assert_allclose(chosen, told.max(axis=1), rtol=2e-5, atol=5e-5)
     assert (policy.about.algorithm.replace("-", ""), policy.about.num_actions) == (
         name.replace("-", ""),
         3,
@@ -173,6 +214,18 @@ def test_what_the_environment_normalises_is_normalised(tmp_path):
     assert repr(agent) == "<Agent: PPO · not fitted · action 0, action 1>"
 
 
+def test_an_agent_that_sees_parts_acts_in_their_environment(tmp_path):
+    model = sb3.PPO("MultiInputPolicy", Doors("nowhere"), n_steps=64, seed=0, device="cpu")
+    model.save(tmp_path / "doors")
+    agents = [
+        trdlab.agent(what, env=lambda: Doors("nowhere")) for what in (model, tmp_path / "doors.zip")
+    ]
+    returns = [agent.evaluate(10, seed=1).returns.tolist() for agent in agents]
+    assert returns[0] == returns[1]
+    with pytest.raises(trdlab.errors.InputError, match=r"'CartPole-v1' does not fit 'doors': it"):
+        trdlab.agent(tmp_path / "doors.zip", env="CartPole-v1")
+
+
 def test_what_cannot_act_here_is_refused(tmp_path):
     model = sb3.PPO("MlpPolicy", "Pendulum-v1", device="cpu")
     with pytest.raises(trdlab.errors.InputError, match="actions of this PPO are Box"):
@@ -184,8 +237,3 @@ def test_what_cannot_act_here_is_refused(tmp_path):
     soft.save(tmp_path / "soft")
     with pytest.raises(trdlab.errors.InputError, match="holds an agent of SAC"):
         read_policy(tmp_path / "soft.zip", Options())
-    both = gym.spaces.Dict({"a": VECTOR, "b": VECTOR})
-    sb3.PPO("MultiInputPolicy", Seen(both), device="cpu").save(tmp_path / "both")
-    with pytest.raises(trdlab.errors.InputError, match="sees a Dict of observations"):
-        read_policy(tmp_path / "both.zip", Options())
-    assert open_agent(Path(tmp_path / "both.zip")).version

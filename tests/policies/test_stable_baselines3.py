@@ -8,6 +8,7 @@ from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 import torch
@@ -24,9 +25,12 @@ from archives import (
     layers,
     ppo_shapes,
     save_archive,
+    several,
     tensors,
     torch_bytes,
 )
+from trdlab.environments.flat import FlatSpace
+from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.policies import Policy, ask
 from trdlab.policies.files import Options
@@ -155,6 +159,34 @@ def test_images_are_divided_by_255_unless_the_archive_says_no(tmp_path):
     assert policy.about.layers == "4 of 8×8 → 4 of 4×4 → 4 of 3×3 → 6 → 2"
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        "{'at': Box([-1. -2.], [1. 2.], (2,), float32), 'key': Discrete(2)}",
+        "OrderedDict([('at', Box(-1.0, 1.0, (2,), float32)), ('key', Discrete(2))])",  # of old
+    ],
+)
+def test_a_dict_is_seen_as_one_vector(tmp_path, said):
+    beside = data(COMMON, several(said), clip_range=1)
+    policy = read(save_archive(tmp_path / "a.zip", drawn(ppo_shapes()), beside))
+    plain = read(cartpole_ppo(tmp_path / "b.zip"))
+    close(ask(policy, SEEN)[0], ask(plain, SEEN)[0])
+    assert policy.about.needs == "a Dict of 'at' (2,), 'key' (2,) and 2 actions"
+    assert policy.about.to_dict()["parts"] == {"at": [2], "key": [2]}
+
+    def fits(**parts: gym.Space[Any]) -> None:
+        there = Interface(FlatSpace(gym.spaces.Dict(**parts)), ("a", "b"))
+        policy.about.check_fits(there, "Maze-v0", "mine")
+
+    fits(at=gym.spaces.Box(0, 1, (2,)), key=gym.spaces.MultiBinary(2))
+    with pytest.raises(
+        InputError,
+        match=r"'Maze-v0' does not fit 'mine': it has a Dict of 'at' \(2,\), 'door' \(2,\) to "
+        r"see\. This PPO needs a Dict of 'at' \(2,\), 'key' \(2,\) and 2 actions\.",
+    ):
+        fits(at=gym.spaces.Box(0, 1, (2,)), door=gym.spaces.Discrete(2))
+
+
 def test_memory_is_carried_and_begins_at_zero(tmp_path):
     lstm = {
         "lstm_actor.weight_ih_l0": (12, 4), "lstm_actor.weight_hh_l0": (12, 3),
@@ -261,7 +293,11 @@ def test_weights_that_do_not_fit_are_named(tmp_path, name, how):
     [
         (data("stable_baselines3.sac.policies", box(4)), "weights|SAC"),
         (data("mine.policies", box(4)), "a class of its own, in the module 'mine'"),
-        (data(COMMON, {":type:": "<class 'gymnasium.spaces.dict.Dict'>"}), "sees a Dict"),
+        (data(COMMON, several("{}")), "sees a Dict of observations, and their parts are not said"),
+        (
+            data(COMMON, several("{'at': Box(-1.0, 1.0, (3,), float32)}")),
+            r"cannot be shown what it says to see, \(3,\): mat1 and mat2 shapes",
+        ),
         (data(COMMON, box(4)) | {"action_space": box(2)}, "are a Box. A decomposition has one row"),
         (data(COMMON, box(4), actions=3), "has 2 outputs for 3 actions"),
         (

@@ -54,6 +54,12 @@ def discrete(n: int) -> dict[str, Any]:
     }
 
 
+def several(spaces: str) -> dict[str, Any]:
+    """Returns a Dict of spaces, which are said as Python prints them."""
+    kind = "<class 'gymnasium.spaces.dict.Dict'>"
+    return {":type:": kind, ":serialized:": PICKLED, "spaces": spaces}
+
+
 def data(module: str, seen: Any, actions: int = 2, **more: Any) -> dict[str, Any]:
     """Returns what stands beside the weights."""
     policy = {":type:": "<class 'abc.ABCMeta'>", ":serialized:": PICKLED, "__module__": module}

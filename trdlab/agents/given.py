@@ -11,6 +11,7 @@ import numpy as np
 from trdlab.agents.agent import Agent
 from trdlab.agents.models import Model, model_of
 from trdlab.agents.places import AXIS, Place, find_place, look
+from trdlab.environments.flat import FlatSpace
 from trdlab.environments.interface import Interface
 from trdlab.environments.naming import is_numbered
 from trdlab.environments.stack import FrameStack
@@ -18,7 +19,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Unfitted
 from trdlab.policies import Memoryless, Policy, ask
 from trdlab.policies.adapted import About
-from trdlab.policies.functions import from_function
+from trdlab.policies.functions import as_they_are, from_function
 from trdlab.policies.registry import policy_of
 from trdlab.rollouts.branches import Copying
 from trdlab.tabular import ExactTable, exact
@@ -111,7 +112,8 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
     """Returns the agent that acts somewhere.
 
     Args:
-        who: an estimator, by its greedy policy; a policy; or a function, see `from_function`.
+        who: an estimator, by its greedy policy; a policy; or a function, see `from_function`. A
+            function is shown a Dict or Tuple as such, all others one vector (see `FlatSpace`).
         place: where.
         name: what to call it.
 
@@ -139,7 +141,8 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
             )
         return replace(agent, estimator=who)
     if not isinstance(who, Policy):
-        who = from_function(who, np.repeat(seen, 2, axis=0), count)
+        shown = found.space.unflat if isinstance(found.space, FlatSpace) else as_they_are
+        who = from_function(who, np.repeat(seen, 2, axis=0), count, shown)
     about = getattr(who, "about", None)
     if isinstance(about, About):
         about.check_fits(found, place.name, name)

@@ -5,7 +5,7 @@ copies, or be pickled by its arguments, as Gymnasium's `EzPickle` does it: then 
 environment at its beginning.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -217,7 +217,10 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def _told(value: Any) -> bytes:
-    return np.asarray(value).tobytes()
+    """Returns an observation or a reward in bytes, whatever parts it has."""
+    if isinstance(value, Mapping):
+        return b"".join(map(_told, value.values()))
+    return b"".join(map(_told, value)) if isinstance(value, tuple) else np.asarray(value).tobytes()
 
 
 def _kind(env: Env) -> str:

@@ -21,6 +21,7 @@ from trdlab.environments.copies import (
     copied,
     prove,
 )
+from trdlab.environments.flat import FlatSpace
 from trdlab.environments.history import Histories, checked_actions
 from trdlab.environments.naming import action_names
 from trdlab.environments.protocol import Frames, NotCopyable, Padding, Step
@@ -34,7 +35,8 @@ class GymEnvironments:
 
     Every episode begins with a seeded reset, so that any moment of it can be restored from that
     seed and the actions since. Images become channels first; grey ones `(H, W)` are single frames,
-    seen as `[B, 1, H, W]` (`stack` is 1). What they print goes to stderr.
+    seen as `[B, 1, H, W]` (`stack` is 1). A Dict or Tuple becomes a vector (see `FlatSpace`). What
+    they print goes to stderr.
 
     Args:
         env: a Gymnasium id, such as `CartPole-v1`, or `module:id` to import a module first; a
@@ -181,7 +183,8 @@ class GymEnvironments:
         self.action_names = action_names(env, self.num_actions, self.first_action)
         self._space = env.observation_space
         self.observation_space = frame_space(self._space, self.name)
-        self._channels_last = self.observation_space.shape != self._space.shape
+        whole = getattr(self.observation_space, "whole", None)
+        self._channels_last = whole is None and self.observation_space.shape != self._space.shape
         grey = is_image(self._space) and len(self._space.shape or ()) == 2
         self.stack = 1 if grey else None
         spec, metadata = getattr(env, "spec", None), getattr(env, "metadata", None)
@@ -246,14 +249,14 @@ class GymEnvironments:
         self._reset(env, frames, self._histories.begin(env, seeding))
 
     def _reset(self, env: int, frames: Frames, seed: int) -> None:
-        frame = np.asarray(observation_of(self._envs[env], seed, self.name))
+        frame = self._frame(observation_of(self._envs[env], seed, self.name))
         if not np.can_cast(frame.dtype, frames.dtype, "same_kind"):
             raise InputError(
                 f"{self.name} gives observations of type {frame.dtype}, and its observation "
                 f"space is {self._space}.",
                 "One of the two is wrong.",
             )
-        frames[env] = self._frame(frame)
+        frames[env] = frame
         self._histories.record_reset(env, frames)
 
     def _act(self, env: int, action: int, step: Step) -> None:
@@ -271,6 +274,8 @@ class GymEnvironments:
             step.following[env] = step.frames[env]
 
     def _frame(self, observation: Any) -> Frames:
+        if isinstance(self.observation_space, FlatSpace):
+            return self._flat(self.observation_space, observation)
         frame = np.asarray(observation)
         if frame.shape != self._space.shape:
             raise InputError(
@@ -279,6 +284,16 @@ class GymEnvironments:
                 "One of the two is wrong.",
             )
         return np.moveaxis(frame, -1, 0) if self._channels_last else frame
+
+    def _flat(self, space: FlatSpace, observation: Any) -> Frames:
+        try:
+            return space.flat(observation)
+        except Exception as error:
+            raise InputError(
+                f"{self.name} gives an observation that is none of its observation space "
+                f"{self._space} ({type(error).__name__}: {error}).",
+                "One of the two is wrong.",
+            ) from error
 
     def _blank_frames(self) -> Frames:
         shape = self.observation_space.shape or ()

@@ -1,7 +1,7 @@
 """What all agents of other libraries become here: a policy, and what is known about it."""
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from math import prod
 from typing import Any, Self
 
@@ -30,6 +30,8 @@ class About:
         memory: how many numbers it remembers from step to step.
         gamma: γ that it was trained with, if that is said.
         draws: whether it draws its actions from probabilities, rather than taking the best.
+        parts: the shapes of what it sees by name, in order, where it sees a Dict; all of them
+            together make one vector then (see `FlatSpace`).
 
     >>> About("PPO", "Stable-Baselines3", "2.0", (4,), 2).title
     'PPO of Stable-Baselines3 2.0'
@@ -45,6 +47,7 @@ class About:
     memory: int = 0
     gamma: float | None = None
     draws: bool = True
+    parts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -55,7 +58,9 @@ class About:
     @property
     def needs(self) -> str:
         """What would fit, in words."""
+        parts = ", ".join(f"'{name}' {shape}" for name, shape in self.parts.items())
         seen = f"observations of shape {self.seen}" if self.seen else "any observations"
+        seen = f"a Dict of {parts}" if parts else seen
         return f"{seen} and {self.num_actions or 'any'} actions"
 
     def check_fits(self, there: Interface, place: str, name: str) -> None:
@@ -70,6 +75,13 @@ class About:
             InputError: it cannot; the message names what was found, and what would fit.
         """
         seen = self.seen is None or _fits(there.space, self.seen)
+        parts = getattr(there.space, "parts", {})
+        if parts and self.parts and list(parts.items()) != list(self.parts.items()):
+            found = ", ".join(f"'{name}' {shape}" for name, shape in parts.items())
+            raise InputError(
+                f"'{place}' does not fit '{name}': it has a Dict of {found} to see.",
+                f"This {self.algorithm} needs {self.needs}.",
+            )
         if not seen or self.num_actions not in (None, len(there.action_names)):
             raise InputError(
                 f"'{place}' does not fit '{name}': it has {there.seen} to see and {there.done}.",
@@ -78,7 +90,9 @@ class About:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns plain data, for JSON."""
-        return {**asdict(self), "seen": None if self.seen is None else list(self.seen)}
+        parts = {name: list(shape) for name, shape in self.parts.items()}
+        seen = None if self.seen is None else list(self.seen)
+        return {**asdict(self), "seen": seen, "parts": parts}
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.errors import InputError, closest
+from trdlab.policies.protocol import rows
 from trdlab.policies.ready import Memoryless
 
 PYTHON = "python:"
@@ -22,6 +23,11 @@ _WANTED = (
 )
 
 
+def as_they_are(observations: Any) -> Any:
+    """Returns observations."""
+    return observations
+
+
 @dataclass(frozen=True)
 class OneByOne:
     """Acts by a function that is shown one observation at a time.
@@ -29,10 +35,12 @@ class OneByOne:
     Args:
         function: from an observation to the number of an action.
         num_actions: A.
+        shown: from observations `[B, ...]` to those that the function takes, a batch likewise.
     """
 
     function: Callable[[Any], Any]
     num_actions: int
+    shown: Callable[[Any], Any] = as_they_are
 
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns 1 for the function's action `[B, A]`; there is nothing to remember.
@@ -40,8 +48,8 @@ class OneByOne:
         Raises:
             InputError: it answers an observation with something else, or fails.
         """
-        count = len(observations)
-        actions = [self._one(observation, at, count) for at, observation in enumerate(observations)]
+        count, batch = len(observations), self.shown(observations)
+        actions = [self._one(rows(batch, at), at, count) for at in range(count)]
         return np.eye(self.num_actions)[actions], None
 
     def _one(self, observation: Any, at: int, count: int) -> int:
@@ -59,7 +67,10 @@ class OneByOne:
 
 
 def from_function(
-    function: Callable[[Any], Any], observations: Any, num_actions: int
+    function: Callable[[Any], Any],
+    observations: Any,
+    num_actions: int,
+    shown: Callable[[Any], Any] = as_they_are,
 ) -> OneByOne | Memoryless:
     """Returns the policy that a function is, by what it answers.
 
@@ -67,6 +78,7 @@ def from_function(
         function: from an observation to an action, or from observations to probabilities.
         observations: `[2, ...]`, to try it with.
         num_actions: A.
+        shown: see `OneByOne`.
 
     Raises:
         InputError: it is neither.
@@ -76,12 +88,13 @@ def from_function(
     >>> from_function(lambda seen: np.full((len(seen), 2), 0.5), np.zeros((2, 4)), 2).function
     <function ...>
     """
-    together = _tried(function, observations)
+    batch = shown(observations)
+    together = _tried(function, batch)
     if np.shape(together) == (len(observations), num_actions):
-        return Memoryless(function)
-    alone = _tried(function, observations[0])
+        return Memoryless(lambda seen: function(shown(seen)))
+    alone = _tried(function, rows(batch, 0))
     if _number(alone) is not None:
-        return OneByOne(function, num_actions)
+        return OneByOne(function, num_actions, shown)
     failed = together if isinstance(together, Exception) else alone
     if isinstance(failed, Exception) and isinstance(alone, Exception):
         raise _failed("the first observation", alone) from alone

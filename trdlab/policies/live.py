@@ -3,10 +3,13 @@
 from importlib import import_module
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import torch
 
 from trdlab.arrays import BoolArray, FloatArray
+from trdlab.environments.flat import FlatSpace
+from trdlab.environments.spaces import frame_space
 from trdlab.errors import InputError
 from trdlab.policies.adapted import About, Drawing, Valuing
 from trdlab.policies.networks import sizes
@@ -40,21 +43,22 @@ def adapt(model: Any) -> Drawing | Valuing | None:
             "Give a function from observations to action probabilities.",
         )
     memory = getattr(policy, "lstm_actor", None)
-    shape, size = space.shape or (), getattr(space, "n", 0)
+    seen = frame_space(space, kind)
     library = type(model).__module__.partition(".")[0]
     about = About(
         kind,
         {"stable_baselines3": "Stable-Baselines3"}.get(library, library.replace("_", "-")),
         str(getattr(import_module(library), "__version__", "")),
-        (int(size),) if size else tuple(shape),
+        (int(seen.n),) if isinstance(seen, gym.spaces.Discrete) else tuple(seen.shape or ()),
         int(actions.n),
         layers=_layers(policy, values),
         activation=getattr(getattr(policy, "activation_fn", None), "__name__", ""),
         memory=2 * memory.num_layers * memory.hidden_size if memory else 0,
         gamma=float(model.gamma),
         draws=values is None,
+        parts=getattr(seen, "parts", {}),
     )
-    asked = _Asked(model)
+    asked = _Asked(model, seen)
     if values is None:
         return Drawing(about, asked.remembering if memory else asked.logits)
     return Valuing(about, asked.quantiles if values == "quantile_net" else asked.values)
@@ -79,10 +83,11 @@ class _Asked:
 
     Args:
         model: see `adapt`.
+        space: of what is seen here.
     """
 
-    def __init__(self, model: Any) -> None:
-        self._policy = model.policy
+    def __init__(self, model: Any, space: gym.Space[Any]) -> None:
+        self._policy, self._space = model.policy, space
         finder = getattr(model, "get_vec_normalize_env", lambda: None)
         self._normalise = finder()
         self._policy.set_training_mode(False)
@@ -123,6 +128,8 @@ class _Asked:
 
     def _seen(self, observations: Any) -> Any:
         """Returns observations as the policy takes them."""
+        if isinstance(self._space, FlatSpace):
+            observations = self._space.unflat(observations)
         if self._normalise is not None:
             observations = self._normalise.normalize_obs(observations)
         return self._policy.obs_to_tensor(observations)[0]

@@ -204,6 +204,35 @@ class Recurrent:
         return logits, tuple(part.transpose(0, 1).contiguous().numpy() for part in then)
 
 
+class Combined(nn.Module):
+    """Parts of a vector, each through layers of its own or as it is, one behind the other again.
+
+    Args:
+        shapes: of the parts, in the order of the vector.
+        layers: of some parts, by their numbers.
+        divisor: what those parts are divided by.
+    """
+
+    def __init__(
+        self, shapes: Sequence[tuple[int, ...]], layers: Mapping[int, nn.Module], divisor: float
+    ) -> None:
+        super().__init__()
+        self.shapes, self.divisor = list(shapes), divisor
+        self.layers = nn.ModuleDict({str(part): of for part, of in layers.items()})
+
+    def forward(self, vectors: Tensor) -> Tensor:
+        """Returns features `[B, n]` of vectors `[B, F]`."""
+        parts = torch.split_with_sizes(vectors, [prod(shape) for shape in self.shapes], dim=1)
+        features: list[Tensor] = []
+        for number, (part, shape) in enumerate(zip(parts, self.shapes, strict=True)):
+            if str(number) in self.layers:
+                image = part.reshape(len(part), *shape) / self.divisor  # [B, C, H, W]
+                features.append(self.layers[str(number)](image))
+            else:
+                features.append(part)
+        return torch.cat(features, dim=1)
+
+
 def sizes(*parts: nn.Module) -> str:
     """Returns what flows through networks, one behind the other, in words.
 

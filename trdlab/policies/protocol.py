@@ -33,8 +33,8 @@ class Policy(Protocol):
         """
 
 
-def rows(state: Any, which: IntArray | BoolArray) -> Any:
-    """Returns some rows of what a policy remembers.
+def rows(state: Any, which: IntArray | BoolArray | int) -> Any:
+    """Returns some rows of what a policy remembers, or one of them.
 
     Args:
         state: of B episodes.

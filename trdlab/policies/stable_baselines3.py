@@ -8,6 +8,7 @@ without its masks, which are the environment's: it may draw an action that it ne
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,11 @@ from torch import nn
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
+from trdlab.policies import archived
 from trdlab.policies.adapted import About, Drawing, Valuing
 from trdlab.policies.files import AgentFile, Options
 from trdlab.policies.networks import (
+    Combined,
     Network,
     Recurrent,
     Weights,
@@ -42,7 +45,7 @@ _IDLE = re.compile(
     r"(q_net_target|quantile_net_target|value_net|vf_features_extractor|pi_features_extractor"
     r"|mlp_extractor\.value_net|lstm_critic|critic)\."
 )
-_EXTRACTOR = r"features_extractor\.(cnn\.\d+|linear\.0)\.(weight|bias)"
+_EXTRACTOR = r"features_extractor\.(extractors\.[^.]+\.)?(cnn\.\d+|linear\.0)\.(weight|bias)"
 _VALUES = re.compile(
     rf"(q_net|quantile_net)\.({_EXTRACTOR}|(q_net|quantile_net)\.\d+\.(weight|bias))"
 )
@@ -117,12 +120,15 @@ class _Saved:
                 f"'{path}' holds an agent of {self.algorithm}.",
                 f"Those of {', '.join(_KNOWN)} can be read; give trdlab.agent the loaded model.",
             )
-        if kind := _kind(self.data.get("observation_space"), "Dict", "Tuple", "MultiDiscrete"):
+        seen = self.data.get("observation_space")
+        if (kind := archived.kind(seen, "Dict", "Tuple")) and not self.parts:
             raise InputError(
-                f"The agent in '{path}' sees a {kind} of observations.",
-                "Agents that see a Box or Discrete space can be read.",
+                f"The agent in '{path}' sees a {kind} of observations, and their parts are not "
+                "said.",
+                _GIVE_MODEL,
             )
-        if kind := _kind(self.data.get("action_space"), "Box", "MultiDiscrete", "MultiBinary"):
+        done = self.data.get("action_space")
+        if kind := archived.kind(done, "Box", "MultiDiscrete", "MultiBinary"):
             raise InputError(
                 f"The actions of the agent in '{path}' are a {kind}.",
                 "A decomposition has one row per action: they must be Discrete.",
@@ -144,6 +150,7 @@ class _Saved:
             seen,
             num_actions,
             gamma=gamma if isinstance(gamma, float | int) and 0.0 <= gamma <= 1.0 else None,
+            parts=self.parts,
             **more,
         )
 
@@ -155,18 +162,35 @@ class _Saved:
 
     def features(self, prefix: str) -> tuple[list[nn.Module], tuple[int, ...], float]:
         """Returns what stands before the dense layers, what is seen, and what divides it."""
-        names = numbered(self.weights, f"{prefix}cnn.")
         space = self.data.get("observation_space")
-        shape, size = _shape(space), _states(space)
+        raw = str(self.kwargs.get("normalize_images", True)) == "False"
+        if parts := self.parts:
+            images = {
+                number: self.of_image(f"{prefix}extractors.{name}.")
+                for number, name in enumerate(parts)
+                if numbered(self.weights, f"{prefix}extractors.{name}.cnn.")
+            }
+            combined = Combined(list(parts.values()), images, 1.0 if raw else _BYTES)
+            return [combined], (sum(map(prod, parts.values())),), 1.0
+        shape, size = archived.shape(space), archived.states(space)
         is_image = (
             len(shape) == 3 and isinstance(space, dict) and "uint8" in str(space.get("dtype"))
         )
-        raw = str(self.kwargs.get("normalize_images", True)) == "False" or not is_image
-        divisor = 1.0 if raw else _BYTES
-        if not names:
+        divisor = 1.0 if raw or not is_image else _BYTES
+        if not numbered(self.weights, f"{prefix}cnn."):
             return [nn.Flatten()], shape or ((size,) if size else ()), divisor
+        return [self.of_image(prefix)], shape, divisor
+
+    def of_image(self, prefix: str) -> nn.Module:
+        """Returns the layers that an image goes through first."""
+        names = numbered(self.weights, f"{prefix}cnn.")
         linear = dense(self.weights, [f"{prefix}linear.0"], nn.ReLU, ends=True)
-        return [convolutions(self.weights, names, _STRIDES), linear], shape, divisor
+        return nn.Sequential(convolutions(self.weights, names, _STRIDES), linear)
+
+    @property
+    def parts(self) -> dict[str, tuple[int, ...]]:
+        """The shapes of what is seen by name, where that is a Dict."""
+        return archived.parts(self.data.get("observation_space"))
 
 
 def _valuing(saved: _Saved, options: Options) -> Valuing:
@@ -224,6 +248,8 @@ def _seen(
     saved: _Saved, said: tuple[int, ...], before: list[nn.Module], after: nn.Module
 ) -> tuple[int, ...]:
     """Returns the shape of an observation: what the archive says, if the first layer agrees."""
+    if saved.parts:
+        return said
     first = next(layer for part in (*before, after) for layer in part.modules() if _takes(layer))
     takes = _takes(first)
     if isinstance(first, nn.Conv2d):
@@ -280,27 +306,5 @@ def _module(data: Mapping[str, Any]) -> str:
     return re.sub(r"[^\w.]", "?", str(said))
 
 
-def _kind(space: Any, *kinds: str) -> str:
-    """Returns which of some kinds a space is, if it is one of them."""
-    said = str(space.get(":type:", "")) if isinstance(space, dict) else ""
-    return next((kind for kind in kinds if said.endswith(f".{kind}'>")), "")
-
-
-def _shape(space: Any) -> tuple[int, ...]:
-    """Returns the shape of a Box; () where none is said."""
-    if not isinstance(space, dict) or not _kind(space, "Box"):
-        return ()
-    said = space.get("_shape", space.get("shape", ""))
-    return tuple(map(int, re.findall(r"\d{1,9}", str(said))))
-
-
-def _states(space: Any) -> int:
-    """Returns the number of states of a Discrete space; 0 where none is said."""
-    if not isinstance(space, dict) or not _kind(space, "Discrete"):
-        return 0
-    said = str(space.get("n", ""))
-    return int(said) if said.isdecimal() and len(said) < 10 else 0
-
-
 def _actions(data: Mapping[str, Any]) -> int:
-    return _states(data.get("action_space"))
+    return archived.states(data.get("action_space"))

@@ -13,11 +13,11 @@ from trdlab.deep.channels import Channel, groups_of
 from trdlab.deep.experience import Ahead, Experience, gather
 from trdlab.deep.fit import Fit
 from trdlab.deep.fit_settings import FitSettings
+from trdlab.environments.outcomes import Outcomes
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
-from trdlab.rollouts.outcomes import Outcomes
 from trdlab.tabular import MDP, exact
 from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.uncertainty import spread

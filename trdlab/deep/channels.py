@@ -13,8 +13,8 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.deep.experience import Experience
+from trdlab.environments.outcomes import check_parts
 from trdlab.estimator import Outlook
-from trdlab.rollouts.outcomes import check_parts
 from trdlab.time_axis import TimeAxis
 
 Kind = Literal["reward", "part", "value", "square", "running", "event", "amount"]

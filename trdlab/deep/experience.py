@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.environments import Environments, NotParallel
 from trdlab.environments.batches import Make
+from trdlab.environments.outcomes import Outcomes
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.policies import Policy
-from trdlab.rollouts.outcomes import Outcomes
 from trdlab.rollouts.playing import Playing
 from trdlab.rollouts.realised import next_flag
 from trdlab.time_axis import TimeAxis

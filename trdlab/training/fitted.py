@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trdlab.environments.interface import Interface
+from trdlab.environments.outcomes import INFO
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.estimator import Future
-from trdlab.rollouts.outcomes import INFO
 from trdlab.runs import MetricsFile, RunFolder, checkpoint_steps, load_checkpoint, save_checkpoint
 from trdlab.runs.folder import is_fit
 from trdlab.time_axis import TimeAxis

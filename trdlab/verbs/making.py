@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from trdlab.agents.places import Where
     from trdlab.deep.settings import Kind
     from trdlab.deep.trainer import TrainMetrics
+    from trdlab.environments.outcomes import Outcome
     from trdlab.policies import Who
-    from trdlab.rollouts.outcomes import Outcome
 
 
 def agent(
@@ -236,9 +236,9 @@ def fit(
     from trdlab.deep.experience import Experience, gather
     from trdlab.deep.fit import Fit
     from trdlab.deep.fit_settings import FitSettings
+    from trdlab.environments.outcomes import Outcomes
     from trdlab.estimator import Future
     from trdlab.policies import acting
-    from trdlab.rollouts.outcomes import Outcomes
     from trdlab.rollouts.playing import usual_limit
     from trdlab.time_axis import TimeAxis
     from trdlab.training import fitted

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from trdlab.environments import GymEnvironments, Step
+from trdlab.environments.outcomes import Outcomes, check_parts
 from trdlab.errors import InputError
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.rollouts.outcomes import Outcomes, check_parts
 from trdlab.tabular.episodes import ModelEnvironments
 
 

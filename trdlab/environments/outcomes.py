@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.environments import Step
+from trdlab.environments.protocol import Step
 from trdlab.errors import InputError, closest
 
 INFO = "info."

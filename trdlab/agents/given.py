@@ -132,6 +132,7 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
         action_names=found.action_names,
         make=place.make,
         seconds_per_step=found.seconds_per_step,
+        copying=place.copying,
     )
     if isinstance(who, Estimator):
         told = np.shape(who.decompose(seen).components)

@@ -42,7 +42,11 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
     own = getattr(known, "time_axis", axis)
     place = None if env is None else find_place(env, env_arguments, own)
     if isinstance(what, Agent):
-        return what if place is None else _moved(what, place)
+        if place is None:
+            return what
+        what.interface.check_fits(look(place.make), place.name)
+        is_away = isinstance(known, ExactTable) and not place.is_model(known.mdp)
+        return replace(what, make=place.make, origin=None, is_away=is_away)
     if isinstance(what, ExactTable):
         return model_agent(_model_around(what, env), place=place, table=what)
     if isinstance(what, gym.Env):
@@ -130,6 +134,7 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
         action_names=found.action_names,
         make=place.make,
         seconds_per_step=found.seconds_per_step,
+        copying=place.copying,
     )
     if isinstance(who, Estimator):
         told = np.shape(who.decompose(seen).components)
@@ -153,14 +158,6 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
             "It must give one for each action.",
         )
     return replace(agent, policy=who)
-
-
-def _moved(agent: Agent, place: Place) -> Agent:
-    """Returns an agent that acts somewhere else."""
-    agent.interface.check_fits(look(place.make), place.name)
-    of = agent.estimator
-    is_away = isinstance(of, ExactTable) and not place.is_model(of.mdp)
-    return replace(agent, make=place.make, origin=None, is_away=is_away)
 
 
 def _model_around(table: ExactTable, env: Any) -> Model:

@@ -79,6 +79,20 @@ def test_an_agent_without_a_name_is_kept_and_named_in_python(tmp_path):
         trdlab.agent(str(tmp_path / "mine"))
 
 
+def test_who_acts_is_the_same_when_it_is_found_again(tmp_path):
+    agent = trdlab.agent("gridworld:bridge", gamma=0.1)  # to whom the far bank is worth nothing
+    fitted = trdlab.fit(agent, out=tmp_path / "fit", **QUICK)  # type: ignore[arg-type]
+    again, states = trdlab.agent(str(tmp_path / "fit")), np.arange(8)
+    for one in (fitted, again):
+        assert one.policy.act(states, None, None)[0].tolist() == (  # type: ignore[union-attr]
+            agent.policy.act(states, None, None)[0].tolist()  # type: ignore[union-attr]
+        )
+    other = trdlab.agent("gridworld:bridge")
+    assert other.policy.act(states, None, None)[0].tolist() != (  # type: ignore[union-attr]
+        again.policy.act(states, None, None)[0].tolist()  # type: ignore[union-attr]
+    )
+
+
 def test_another_policy_is_another_agent_and_has_not_its_name(tmp_path):
     agent = trdlab.agent("gridworld:ledge", horizon=2)
     stumbling = trdlab.agent(agent, policy=EpsilonGreedy(agent.policy, 0.3))

@@ -149,7 +149,7 @@ def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent
         )
     if env is None:
         env, env_arguments = whose.env, whose.env_arguments
-    of = find_agent(whose.agent, env=env, env_arguments=env_arguments)
+    of = find_agent(whose.agent, gamma=whose.solved_for, env=env, env_arguments=env_arguments)
     interface.check_fits(of.interface, str(env or whose.agent))
     policy = acting(of.policy or of.estimator)
     origin = of.origin and replace(of.origin, name=name, time_axis=None)

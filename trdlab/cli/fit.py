@@ -109,7 +109,7 @@ def go_on(path: Path) -> None:
             f"The {what} of '{path}' {'was' if plan.agent is None else 'were'} given in Python.",
             f"Go on there: trdlab.fit(…, out='{path}') with all that it was begun with.",
         )
-    found = _agent(plan.agent, plan.env, list(plan.env_arguments))
+    found = _agent(plan.agent, plan.env, list(plan.env_arguments), gamma=plan.solved_for)
     _fit(found, path, **plan.arguments)
 
 
@@ -138,11 +138,12 @@ def _fit(found: "Agent", out: Path, **how: Any) -> None:
     common.print_line(f"It took {time.monotonic() - began:.0f} s. Try: trdlab explain {out}", "dim")
 
 
-def _agent(agent: str, env: str | None, env_arguments: list[str] | None) -> "Agent":
+def _agent(agent: str, env: str | None, env_arguments: list[str] | None, **how: Any) -> "Agent":
     import trdlab
     from trdlab.environments.arguments import parse_arguments
 
-    return trdlab.agent(agent, env=env, env_arguments=dict(parse_arguments(env_arguments or [])))
+    given = dict(parse_arguments(env_arguments or []))
+    return trdlab.agent(agent, env=env, env_arguments=given, **how)
 
 
 def _places(given: list[str] | None) -> dict[str, str]:

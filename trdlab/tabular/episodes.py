@@ -56,7 +56,9 @@ class ModelEnvironments:
     ) -> None:
         if num_envs < 1:
             raise InputError(f"There are {num_envs} environments.", "Make at least 1.")
-        begin = np.eye(mdp.num_states)[mdp.start] if starts is None else np.asarray(starts)
+        begin = np.zeros(mdp.num_states) if starts is None else np.asarray(starts)
+        if starts is None:
+            begin[mdp.start] = 1.0
         if begin.shape != (mdp.num_states,) or begin.min() < 0.0 or abs(begin.sum() - 1) > 1e-9:
             raise InputError(
                 "The starts are no distribution over the states.",

@@ -38,6 +38,7 @@ class Plan:
         agent: as a user names it; None where it was given as an object.
         env: where it acts; None where it was made for.
         env_arguments: what that is made with, as `KEY=VALUE`.
+        solved_for: the γ of the table that the agent acts by; None where it has none.
         axis: γ, N and w.
         steps: that it plays, at least.
         share: of its actions that are forced.
@@ -49,6 +50,7 @@ class Plan:
     agent: str | None
     env: str | None
     env_arguments: tuple[str, ...]
+    solved_for: float | None
     axis: TimeAxis
     steps: int
     share: float
@@ -82,6 +84,7 @@ class Plan:
             "agent": self.agent,
             "env": self.env,
             "env_arguments": list(self.env_arguments),
+            "solved_for": self.solved_for,
             "gamma": self.axis.gamma,
             "N": self.axis.horizon,
             "w": self.axis.width,
@@ -111,6 +114,7 @@ class Plan:
             agent=config.get("agent"),
             env=config.get("env"),
             env_arguments=tuple(config["env_arguments"]),
+            solved_for=config.get("solved_for"),
             axis=TimeAxis(config["gamma"], config["N"], config["w"]),
             steps=config["steps"],
             share=config["share"],

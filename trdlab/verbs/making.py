@@ -257,6 +257,7 @@ def fit(
             agent=None if of is None else of.name,
             env=of.env if of is not None and of.away else None,
             env_arguments=of.env_arguments if of is not None and of.away else (),
+            solved_for=of.time_axis.gamma if of is not None and of.time_axis else None,
             axis=axis,
             steps=steps,
             share=share,

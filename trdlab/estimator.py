@@ -1,7 +1,7 @@
 """The contract of everything that decomposes: an exact table, a learned one, a network."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from typing import Any, Protocol, Self, runtime_checkable
 
@@ -41,11 +41,11 @@ class Future:
     time_limit_ends: bool = False
 
     def __post_init__(self) -> None:
-        for field, kind in zip(fields(self), (str, bool, bool, bool), strict=True):
-            value = getattr(self, field.name)
+        for of, kind in zip(fields(self), (str, bool, bool, bool), strict=True):
+            value = getattr(self, of.name)
             if not isinstance(value, kind):
                 wanted = "It must be True or False." if kind is bool else "Say in words who acts."
-                raise InputError(f"The {field.name} of a Future is {value!r}.", wanted)
+                raise InputError(f"The {of.name} of a Future is {value!r}.", wanted)
 
     @property
     def reward(self) -> str:
@@ -111,6 +111,9 @@ class Outlook:
         parts: `[..., A, N+1]` each, the parts that add up to the reward, discounted.
         events: `[..., A, N]` each, how likely something happens in each component.
         amounts: `[..., A, N+1]` each, of something else that is counted, discounted.
+        survival_reach: how many components in a row, from the first on, survival was surely told
+            better than by a constant guess; 0 if that has not been judged.
+        reach: the same of each part, event and amount.
     """
 
     variance: FloatArray
@@ -119,6 +122,24 @@ class Outlook:
     parts: Mapping[str, FloatArray]
     events: Mapping[str, FloatArray]
     amounts: Mapping[str, FloatArray]
+    survival_reach: int = 0
+    reach: Mapping[str, int] = field(default_factory=dict)
+
+    def __getitem__(self, index: int) -> "Outlook":
+        """Returns what is expected of one of the batch."""
+
+        def one(of: Mapping[Any, FloatArray]) -> dict[Any, FloatArray]:
+            return {name: array[index] for name, array in of.items()}
+
+        return replace(
+            self,
+            variance=self.variance[index],
+            survival=self.survival[index],
+            chances=one(self.chances),
+            parts=one(self.parts),
+            events=one(self.events),
+            amounts=one(self.amounts),
+        )
 
 
 class Unfitted:

@@ -67,6 +67,8 @@ def test_what_is_kept_is_what_was_fitted(kept: Path):
     assert (whose.agent, whose.env) == ("gridworld:ledge", None)
     again = trdlab.agent(str(kept))
     assert (again.name, again.estimator.time_axis) == ("ledge", trdlab.TimeAxis(0.95, 3))
+    assert len(estimator.reach) == len(estimator.channels) > 2
+    assert estimator.reach == fitted.estimator.reach
     assert trdlab.load(kept).decompose(states).components.tobytes() == told.tobytes()
 
 

@@ -144,8 +144,18 @@ def reward_of(channels: Channels, components: FloatArray) -> FloatArray:
     return np.asarray(weights @ components)
 
 
-def outlook_of(channels: Channels, components: FloatArray, axis: TimeAxis) -> Outlook:
-    """Returns what all channels `[..., C, N+1]` say beside the mean of the reward."""
+def outlook_of(
+    channels: Channels, components: FloatArray, axis: TimeAxis, reach: Sequence[int] = ()
+) -> Outlook:
+    """Returns what all channels `[..., C, N+1]` say beside the mean of the reward.
+
+    Args:
+        channels: what they are, C of them.
+        components: of each.
+        axis: γ, N and w.
+        reach: how many components of each were told better than by a constant guess, if that has
+            been judged.
+    """
     discounts = axis.discounts[:-1]  # [N]
     safe = np.where(discounts > 0.0, discounts, 1.0)
     mean = reward_of(channels, components)[..., :-1]  # [..., N]
@@ -173,7 +183,17 @@ def outlook_of(channels: Channels, components: FloatArray, axis: TimeAxis) -> Ou
                 amounts[channel.name] = whole
     now = np.ones((*alive.shape[:-1], 1), dtype=alive.dtype)  # [..., 1]
     survival = np.concatenate([now, alive], axis=-1)  # [..., N+1]
-    return Outlook(np.maximum(square - mean**2, 0.0), survival, chances, parts, events, amounts)
+    judged = dict(zip(channels, reach, strict=False))
+    return Outlook(
+        variance=np.maximum(square - mean**2, 0.0),
+        survival=survival,
+        chances=chances,
+        parts=parts,
+        events=events,
+        amounts=amounts,
+        survival_reach=judged.get(Channel("running"), 0),
+        reach={channel.name: own for channel, own in judged.items() if channel.name},
+    )
 
 
 def _within(experience: Experience, width: int) -> list[BoolArray]:

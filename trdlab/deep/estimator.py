@@ -29,6 +29,8 @@ class NetworkEstimator:
         channels: where the network tells several numbers of each action, what they are, C of them.
         possible: `[2, C, N+1]`, the least and the most that they can be, if that is known; what the
             network tells beyond is cut to it.
+        reach: how many components of each channel, from the first on, are surely told better than
+            by a constant guess; empty if that has not been judged.
 
     Raises:
         InputError: the network has another number of components, or `batch_size` is below 1.
@@ -41,6 +43,7 @@ class NetworkEstimator:
     batch_size: int = 256
     channels: Channels = ()
     possible: FloatArray | None = None
+    reach: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         ours, theirs = self.time_axis.num_components, self.network.num_components
@@ -72,7 +75,7 @@ class NetworkEstimator:
         """
         if not self.channels or not self.time_axis.horizon:
             return None
-        return outlook_of(self.channels, self._told(observations), self.time_axis)
+        return outlook_of(self.channels, self._told(observations), self.time_axis, self.reach)
 
     def _told(self, observations: Any) -> FloatArray:
         """Returns all that the network tells: `[B, A, N+1]`, or of channels `[B, A, C, N+1]`."""

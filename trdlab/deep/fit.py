@@ -23,6 +23,7 @@ from trdlab.deep.networks import DecompositionNetwork, VectorNetwork, build_netw
 from trdlab.deep.update import arrays_of, load_moments, load_weights, moments_of
 from trdlab.errors import InputError
 from trdlab.estimator import Future
+from trdlab.rollouts.realised import Samples
 from trdlab.time_axis import TimeAxis
 
 _LEAST_SCALE = 1e-6  # of the largest: a component that hardly pays is not blown up to its size
@@ -180,15 +181,32 @@ class Fit:
     def error(self) -> float:
         """Returns the held-out error (see `FitProgress`)."""
         rows, came, known, constant = self._known
-        parts = []
-        with torch.inference_mode():
-            for part in np.array_split(rows, -(-len(rows) // _CHUNK)):
-                told = self._components(self.network, part)  # [K, A, C, N+1]
-                parts.append(told[range(len(part)), self._actions(part)].numpy())
-        apart = np.where(known, np.concatenate(parts) - came, 0.0)
+        apart = np.where(known, self._told(rows) - came, 0.0)
         size = np.where(known, came - constant, 0.0)
         least = _NOTHING * (np.where(known, came, 0.0) ** 2).sum()
         return float((apart**2).sum() / max((size**2).sum(), least, 1e-30))
+
+    def samples(self) -> tuple[Samples, ...]:
+        """Returns for each channel what was predicted of held-out steps, and what came."""
+        rows, came, known, _ = self._known
+        order = np.argsort(rows)
+        numbers = np.unique(self.experience.last[rows[order]], return_inverse=True)[1]
+        kept = deepcopy(self.network.state_dict())
+        self.network.load_state_dict(self._best_weights)
+        told = np.clip(self._told(rows) * self.scale, *self.possible)  # [K, C, N+1]
+        self.network.load_state_dict(kept)
+        flags = np.broadcast_to(known[:, 0], told[:, 0].shape)[order]  # [K, N+1]
+        return tuple(
+            Samples(
+                self.axis,
+                predicted=told[order, at].astype(np.float64),
+                observed=np.where(flags, (came * self.scale)[order, at], 0.0),
+                known=flags,
+                episode=numbers,
+                num_episodes=int(numbers.max()) + 1,
+            )
+            for at in range(len(self.channels))
+        )
 
     def estimator(self, future: Future) -> NetworkEstimator:
         """Returns the best network as an Estimator, its outputs in discounted reward."""
@@ -202,6 +220,15 @@ class Fit:
         return NetworkEstimator(
             network, self.axis, future, channels=self.channels, possible=self.possible
         )
+
+    def _told(self, rows: IntArray) -> FloatArray:
+        """Returns `[K, C, N+1]` of the actions taken, as shares of the scale."""
+        parts = []
+        with torch.inference_mode():
+            for part in np.array_split(rows, -(-len(rows) // _CHUNK)):
+                told = self._components(self.network, part)  # [K, A, C, N+1]
+                parts.append(told[range(len(part)), self._actions(part)].numpy())
+        return np.concatenate(parts)
 
     def _components(self, network: DecompositionNetwork, rows: IntArray) -> torch.Tensor:
         told: torch.Tensor = network(torch.from_numpy(self.experience.observations[rows]))

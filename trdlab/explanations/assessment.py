@@ -176,11 +176,14 @@ def moment_of_play(agent: Agent, playing: Playing) -> Moment:
     decision = playing.decide()
     # findings compare sums, and float32 sums differ in order
     components = decision.decomposition.components[0].astype(np.float64)  # [A, N+1]
+    seen = playing.stack.observations[playing.running][:1]  # [1, ...]
+    outlook = agent.estimator.outlook(seen) if hasattr(agent.estimator, "outlook") else None
     return Moment(
         RewardDecomposition(components, agent.estimator.time_axis),
         agent.action_names,
         agent.estimator.future,
         policy=decision.probabilities[0].astype(np.float64),
+        outlook=None if outlook is None else outlook[0],
         seconds_per_step=agent.seconds_per_step,
     )
 

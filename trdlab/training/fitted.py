@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -167,6 +167,7 @@ def learn(
     *,
     folder: RunFolder | None = None,
     seconds: float | None = None,
+    judge: "Callable[[Fit], tuple[int, ...]]" = lambda fitting: (),
     tell: "Callable[[FitProgress], None]" = lambda progress: None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> "NetworkEstimator":
@@ -178,6 +179,7 @@ def learn(
         future: whose future is told.
         folder: where it is kept; None for nowhere.
         seconds: after which learning stops, if not before.
+        judge: says how far each channel reaches, when all is learned.
         tell: told of each look at the held-out error.
         should_stop: asked before each.
 
@@ -188,7 +190,7 @@ def learn(
     if folder is None:
         fitting = make(experience())
         _rounds(fitting, seconds, tell, should_stop, lambda: None)
-        return fitting.estimator(future)
+        return replace(fitting.estimator(future), reach=judge(fitting))
     with folder.held():
         fitting = _begun(folder, experience, make, future)
         with MetricsFile(folder.metrics, fitting.num_updates) as metrics:
@@ -198,8 +200,9 @@ def learn(
                 tell(progress)
 
             _rounds(fitting, seconds, told, should_stop, lambda: _save(folder, fitting, future))
-        _save(folder, fitting, future, done=True)
-    return fitting.estimator(future)
+        reach = judge(fitting)
+        _save(folder, fitting, future, reach, done=True)
+    return replace(fitting.estimator(future), reach=reach)
 
 
 def _rounds(
@@ -244,7 +247,14 @@ def _begun(
     return fitting
 
 
-def _save(folder: RunFolder, fitting: "Fit", future: Future, *, done: bool = False) -> None:
+def _save(
+    folder: RunFolder,
+    fitting: "Fit",
+    future: Future,
+    reach: tuple[int, ...] = (),
+    *,
+    done: bool = False,
+) -> None:
     """Saves a fit; what was played is kept until it is done."""
     from trdlab.deep.update import arrays_of
 
@@ -262,6 +272,7 @@ def _save(folder: RunFolder, fitting: "Fit", future: Future, *, done: bool = Fal
         "q_network": arrays_of(estimator.network.state_dict()),
         "channels": [asdict(channel) for channel in fitting.channels],
         "possible": fitting.possible,
+        "reach": list(reach),
         "hidden": [getattr(layer, "out_features", 0) for layer in fitting.network.body.children()],
         "experience": {name: [of.dtype.str, list(of.shape)] for name, of in columns.items()},
         "learner": {} if done else fitting.state_dict(),
@@ -301,6 +312,11 @@ def load_fit(path: Path) -> "tuple[NetworkEstimator, Interface, Plan]":
             f"'{path}' does not say what was fitted: it is torn.", "Fit the agent again."
         ) from error
     estimator = NetworkEstimator(
-        network, plan.axis, future, channels=channels, possible=state["possible"]
+        network,
+        plan.axis,
+        future,
+        channels=channels,
+        possible=state["possible"],
+        reach=tuple(state["reach"]),
     )
     return estimator, interface, plan

@@ -238,6 +238,7 @@ def fit(
     from trdlab.deep.fit_settings import FitSettings
     from trdlab.environments.outcomes import Outcomes
     from trdlab.estimator import Future
+    from trdlab.explanations.calibration.calibration import calibrate
     from trdlab.policies import acting
     from trdlab.rollouts.playing import usual_limit
     from trdlab.time_axis import TimeAxis
@@ -293,6 +294,9 @@ def fit(
         space = frozen.interface.space
         return Fit(experience, space, axis, chosen, names=read.names, parts=made_of)
 
+    def judge(fitting: Fit) -> tuple[int, ...]:
+        return tuple(calibrate(of, seed=seed).trust.components for of in fitting.samples())
+
     with watch if progress else nullcontext():
         estimator = fitted.learn(
             played,
@@ -300,6 +304,7 @@ def fit(
             future,
             folder=folder,
             seconds=seconds,
+            judge=judge,
             tell=watch.tell if progress else lambda now: None,
             should_stop=should_stop,
         )

@@ -10,7 +10,7 @@ import numpy as np
 from trdlab.arrays import FloatArray, difference, same
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, closest
-from trdlab.estimator import Estimator, Future
+from trdlab.estimator import Estimator, Future, Outlook
 from trdlab.explanations.rules import Language
 from trdlab.explanations.words import forms_of
 
@@ -81,6 +81,7 @@ class Moment:
         tied_later: the number of later states where that is so.
         what_ifs: the quantities that can be varied, where there is a model to solve again.
         uncertainty: spread and survival, where they are known.
+        outlook: what else was learned to be expected, where that is so.
         calibration: how good such forecasts are, if that has been judged.
         foils: the same of first actions that the policy does not take.
         seconds_per_step: how long a step takes as people play, if that is known.
@@ -97,6 +98,7 @@ class Moment:
     tied_later: int = 0
     what_ifs: tuple[WhatIf, ...] = ()
     uncertainty: Uncertainty | None = None
+    outlook: Outlook | None = None
     calibration: "Calibration | None" = None
     foils: "Calibration | None" = None
     seconds_per_step: float | None = None

@@ -37,6 +37,7 @@ AXIS = TimeAxis(0.95, 8)
 METHODS: tuple[Method, ...] = ("mixed", "regression", "td")
 FUTURE = Future("the given policy")
 UNPAID = "unpaid end"
+STEPS = {"FrozenLake": 1_000_000, "drone": 300_000, "ledge": 300_000}
 Parts = dict[str, np.ndarray]
 
 
@@ -94,7 +95,7 @@ def errors(
         experience,
         gym.spaces.Discrete(mdp.num_states),
         AXIS,
-        FitSettings(method, batch_size=1_024, seed=seed),
+        FitSettings(method, batch_size=512, seed=seed),
         names=tuple(outcomes(parts)),
         parts=tuple(parts),
     )
@@ -125,7 +126,7 @@ def _table(mdp: MDP, policy: np.ndarray) -> np.ndarray:
     return exact(mdp, AXIS, policy=policy).decomposition.components
 
 
-def truth(steps: int, seeds: int) -> None:
+def truth(steps: int | None, seeds: int) -> None:
     """Prints the errors of every method, the worst of all seeds."""
     kinds = ["components", "variance", "survival", "parts", "event"]
     print(f"| world | policy | method | {' | '.join(kinds)} | seconds |")
@@ -136,7 +137,8 @@ def truth(steps: int, seeds: int) -> None:
             took = dict.fromkeys(METHODS, 0.0)
             for seed in range(seeds):
                 policy = policies(mdp, seed)[kind]
-                seen = {pause: played(name, policy, steps, seed, pause) for pause in (0, 8)}
+                count = steps or STEPS[name]
+                seen = {pause: played(name, policy, count, seed, pause) for pause in (0, 8)}
                 for method in METHODS:
                     began = time.perf_counter()
                     own = seen[AXIS.num_steps if method == "regression" else 0]
@@ -222,13 +224,13 @@ def _seconds(update: Callable[[], object], count: int) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=2_000_000)
+    parser.add_argument("--steps", type=int, help=f"By default {STEPS}.")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--cost", action="store_true")
     options = parser.parse_args()
     torch.set_num_threads(1)
     if options.cost:
-        cost(min(options.steps, 50_000))
+        cost(options.steps or 50_000)
     else:
         truth(options.steps, options.seeds)
 

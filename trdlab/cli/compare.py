@@ -61,7 +61,7 @@ def compare(
     """
     from trdlab.agents.naming import find_pair
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explanations.comparison import comparing as two
+    from trdlab.explanations.comparison import comparison as two
 
     agents = find_pair(
         (first, second),

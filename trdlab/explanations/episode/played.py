@@ -1,11 +1,11 @@
 """An episode that was played, and how what is said of one looks."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from trdlab.agents.agent import Agent
 from trdlab.explanations.episode.revision import Revision, revise
 from trdlab.explanations.rules import Form, Language
 from trdlab.explanations.words import forms_of
@@ -26,11 +26,11 @@ class Played:
     episode: Episode
     action_names: tuple[str, ...]
     seconds_per_step: float | None = None
-    revision: Revision = field(init=False)
-    """What each step changed; it follows from the episode."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "revision", revise(self.episode))
+    @cached_property
+    def revision(self) -> Revision:
+        """What each step changed."""
+        return revise(self.episode)
 
     @property
     def scale(self) -> float:
@@ -42,12 +42,6 @@ class Played:
     def action(self, step: int) -> str:
         """Returns the name of the action taken at a step."""
         return self.action_names[int(self.episode.actions[step])]
-
-    def row(self, step: int) -> int | None:
-        """Returns the place of a step in the revision, None if it has none."""
-        steps = self.revision.steps
-        place = int(np.searchsorted(steps, step))
-        return place if place < len(steps) and steps[place] == step else None
 
 
 def _forms(played: Played) -> dict[str, Form]:
@@ -83,9 +77,3 @@ def _rounded_up(value: float) -> float:
 
 
 EPISODES = Language[Played]("this episode", _forms)
-
-
-def play(agent: Agent, seed: int = 0, *, max_steps: int | None = None) -> Played:
-    """Returns an episode that an agent's policy plays, without any random actions of ours."""
-    (episode,) = agent.play(1, seed=seed, max_steps=max_steps)
-    return Played(episode, agent.action_names, agent.seconds_per_step)

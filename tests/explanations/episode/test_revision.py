@@ -5,7 +5,7 @@ import pytest
 
 from by_hand import episode
 from trdlab.decomposition import TimeAxis
-from trdlab.explanations.episode.revision import revise
+from trdlab.explanations.episode.played import revise
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.rollouts.episodes import collect
 from trdlab.tabular import exact

@@ -121,17 +121,12 @@ def exact_moment(world: Gridworld | TabularWorld, table: ExactTable, state: int)
     """Returns what the table of a model expects in one state, with what can be varied there."""
     if isinstance(world, Gridworld):
         return gridworld_moment(world, table, state)
-    return tabular_moment(table, state, world.action_names, gamma_what_ifs(table, state))
-
-
-def gamma_what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
-    """Returns γ as a quantity that can be varied, where few enough states can follow."""
     from trdlab.tabular.models import part_after  # gridworlds do without it
 
     gamma, part = table.time_axis.gamma, part_after(table.mdp, state)
-    if part.num_states > MAX_WHAT_IF_STATES:
-        return []
-    return [gamma_what_if(part, gamma, part.start)]
+    is_small = part.num_states <= MAX_WHAT_IF_STATES
+    what_ifs = [gamma_what_if(part, gamma, part.start)] if is_small else []
+    return tabular_moment(table, state, world.action_names, what_ifs)
 
 
 def gamma_what_if(mdp: MDP, gamma: float, state: int) -> WhatIf:

@@ -144,7 +144,8 @@ class Moment:
     @property
     def only_reward(self) -> float | None:
         """The one reward that was ever observed besides 0; None if there are more, or unknown."""
-        return None if self.calibration is None else self.calibration.only_reward
+        known = None if self.calibration is None else self.calibration.reliability
+        return None if known is None else known.amount
 
     def judged(self, action: str) -> "Calibration | None":
         """Returns how good forecasts of such an action are, if that has been judged."""

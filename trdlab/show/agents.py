@@ -145,8 +145,8 @@ def _(comparison: Comparison) -> dict[str, Any]:
         "schema": "trdlab.compare/2",
         "agents": {
             side: {
-                "name": agents[i].name,
-                "words": [] if (of := agents[i].origin) is None else list(of.words),
+                "name": comparison.names[i],
+                "words": list(comparison.words[i]),
                 "future": agents[i].estimator.future.to_dict(),
                 "mean": plain_data({end: of[i] for end, of in vars(comparison.means).items()}),
                 "calibration": None if report is None else data(report),

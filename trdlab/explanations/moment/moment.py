@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from trdlab.arrays import FloatArray, difference, same
+from trdlab.arrays import FloatArray, difference
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, closest
 from trdlab.estimator import Estimator, Future, Outlook
@@ -38,8 +38,7 @@ class WhatIf(NamedTuple):
     def gap(self, action: int, foil: int, value: float) -> float:
         """Returns Q(action) − Q(foil) at a value, 0 where they differ only by rounding."""
         q_values = self.q_values(value)
-        a, b = float(q_values[action]), float(q_values[foil])
-        return 0.0 if same(a, b) else a - b
+        return float(difference(q_values[action], q_values[foil]))
 
     def verb(self, of_gamma: str, of_reward: str, of_cost: str) -> str:
         """Returns the word for what this quantity does: γ is, a source pays or costs."""
@@ -147,7 +146,8 @@ class Moment:
     @property
     def only_reward(self) -> float | None:
         """The one reward that was ever observed besides 0; None if there are more, or unknown."""
-        return None if self.calibration is None else self.calibration.only_reward
+        known = None if self.calibration is None else self.calibration.reliability
+        return None if known is None else known.amount
 
     def judged(self, action: str) -> "Calibration | None":
         """Returns how good forecasts of such an action are, if that has been judged."""

@@ -226,6 +226,25 @@ def test_an_agent_that_sees_parts_acts_in_their_environment(tmp_path):
         trdlab.agent(tmp_path / "doors.zip", env="CartPole-v1")
 
 
+@pytest.mark.parametrize("live", [False, True], ids=["archive", "loaded"])
+def test_masks_do_what_they_do_in_their_library(live, tmp_path):
+    model = contrib.MaskablePPO("MultiInputPolicy", Doors(), n_steps=64, seed=0, device="cpu")
+    model.learn(128)
+    model.save(tmp_path / "doors")
+    what = model if live else tmp_path / "doors.zip"
+    agent, rng = trdlab.agent(what, env=Doors), np.random.default_rng(0)
+    observations, allowed = drawn(Doors().observation_space, 200), rng.random((200, 3)) < 0.5
+    allowed[:, 1] |= ~allowed.any(axis=1)
+    seen, _ = model.policy.obs_to_tensor(together(observations))
+    with torch.no_grad():
+        told = model.policy.get_distribution(seen, action_masks=allowed).distribution.probs.numpy()
+    shown = as_shown(Doors().observation_space, observations)
+    likely = ask(agent.policy, shown, allowed=allowed)[0]
+    np.testing.assert_allclose(likely, told, rtol=2e-5, atol=1e-6)
+    for greedy in (False, True):  # a closed door would be an error
+        assert agent.evaluate(20, greedy=greedy).mean.value > 3
+
+
 def test_what_cannot_act_here_is_refused(tmp_path):
     model = sb3.PPO("MlpPolicy", "Pendulum-v1", device="cpu")
     with pytest.raises(trdlab.errors.InputError, match="actions of this PPO are Box"):

@@ -36,8 +36,8 @@ def check_reset(env: Any, name: str) -> None:
             )
 
 
-def observation_of(env: Any, seed: int, name: str) -> Any:
-    """Begins an episode, and returns its first observation.
+def beginning_of(env: Any, seed: int, name: str) -> tuple[Any, Any]:
+    """Begins an episode, and returns its first observation and `info`.
 
     Raises:
         InputError: `reset` does not return an observation and `info`.
@@ -49,17 +49,17 @@ def observation_of(env: Any, seed: int, name: str) -> Any:
             f"{name}.reset() returns {found}.",
             "Return observation, info, as Gymnasium asks since 0.26.",
         )
-    return answer[0]
+    return answer
 
 
-def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool]:
-    """Takes an action, and returns observation, reward, terminated, truncated.
+def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool, Any]:
+    """Takes an action, and returns observation, reward, terminated, truncated and `info`.
 
     Raises:
         InputError: `step` does not return five values, or the reward is no number.
     """
     try:
-        observation, reward, terminated, truncated, _ = env.step(action)
+        observation, reward, terminated, truncated, info = env.step(action)
     except (TypeError, ValueError) as error:
         if "unpack" not in str(error) or not _is_passed_on(error):
             raise
@@ -69,7 +69,7 @@ def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool
             "0.26: 'done' became two.",
         ) from error
     paid = float(reward) if isinstance(reward, int | float) else _number(reward, name)
-    return observation, paid, bool(terminated), bool(truncated)
+    return observation, paid, bool(terminated), bool(truncated), info
 
 
 def _is_passed_on(error: Exception) -> bool:

@@ -41,6 +41,7 @@ class Step:
         life_lost: `[B]`, whether a life was lost and the episode goes on.
         following: `[B, ...]`, the frame that the next action is chosen at: that of `frames`, or
             the first one of the next episode where one ended.
+        allowed: `[B, A]`, which actions could be taken at `frames`; None where all can always be.
     """
 
     frames: Frames
@@ -49,6 +50,7 @@ class Step:
     truncated: BoolArray
     life_lost: BoolArray
     following: Frames
+    allowed: BoolArray | None = None
 
     @property
     def ended(self) -> BoolArray:
@@ -114,6 +116,16 @@ class Environments(Protocol):
     def close(self) -> None:
         """Lets go of what the environments hold."""
         ...
+
+
+class MaskedEnvironments(Environments, Protocol):
+    """Environments in which some actions cannot be taken at times.
+
+    Attributes:
+        allowed: `[B, A]`, which can be taken now; None where all can, as far as was ever told.
+    """
+
+    allowed: BoolArray | None
 
 
 class CopyableEnvironments(Environments, Protocol):

@@ -118,7 +118,13 @@ class Valuing:
 
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns 1 for that action `[B, A]`; there is nothing to remember."""
-        return greedy(self.q_values(observations)), None
+        return self.act_within(observations, state, begins, None)
+
+    def act_within(
+        self, observations: Any, state: Any, begins: BoolArray, allowed: BoolArray | None
+    ) -> tuple[FloatArray, Any]:
+        """Returns the same, of the actions that are `allowed [B, A]`."""
+        return greedy(self.q_values(observations), allowed), None
 
     def q_values(self, observations: Any) -> FloatArray:
         """Returns the value of each action `[B, A]`.

@@ -1,8 +1,8 @@
 """Agents in the archives of Stable-Baselines3 and sb3-contrib; neither has to be installed.
 
 Only tensors and plain JSON are read: what an archive holds as pickles stays unread. Layers and
-their sizes follow from the tensors. The formats are those of versions 1.0 to 2.9. MaskablePPO acts
-without its masks, which are the environment's: it may draw an action that it never could.
+their sizes follow from the tensors. The formats are those of versions 1.0 to 2.9. The masks of
+MaskablePPO are the environment's, and are no part of the archive.
 """
 
 import re

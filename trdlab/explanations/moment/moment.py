@@ -89,6 +89,7 @@ class Moment:
         only_reward: the one reward that was ever observed besides 0; None where there were several,
             and where that is not known.
         seconds_per_step: how long a step takes as people play, if that is known.
+        forbidden: the names of actions that cannot be taken here; they are none of the A.
     """
 
     decomposition: RewardDecomposition
@@ -108,6 +109,7 @@ class Moment:
     foil_error: FloatArray | None = None
     only_reward: float | None = None
     seconds_per_step: float | None = None
+    forbidden: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):
@@ -131,8 +133,11 @@ class Moment:
         """Returns the number of an action.
 
         Raises:
-            InputError: there is no such action; the message suggests one.
+            InputError: there is no such action, and the message suggests one; or it is forbidden.
         """
+        if action in self.forbidden:
+            allowed = ", ".join(self.action_names)
+            raise InputError(f"The environment forbids '{action}' here.", f"It allows {allowed}.")
         if action not in self.action_names:
             raise InputError(f"There is no action '{action}'.", closest(action, self.action_names))
         return self.action_names.index(action)

@@ -16,7 +16,8 @@ import numpy as np
 import torch
 
 from trdlab.deep.experience import gather
-from trdlab.deep.fit import Fit, FitSettings, Method
+from trdlab.deep.fit import Fit
+from trdlab.deep.fit_settings import FitSettings, Method
 from trdlab.estimator import Future
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless

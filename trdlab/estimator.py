@@ -1,5 +1,6 @@
 """The contract of everything that decomposes: an exact table, a learned one, a network."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from itertools import product
 from typing import Any, Protocol, Self, runtime_checkable
@@ -95,6 +96,29 @@ class Future:
             f"No future counts the '{words['reward']}' and ends at '{words['ending']}'.",
             "Write it with to_dict.",
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """What an estimator expects of a batch beside the mean of the reward.
+
+    Args:
+        variance: `[..., A, N]`, of the discounted reward of each explicit component. That of the
+            residual does not follow the law, and is not told.
+        survival: `[..., A, N+1]`, how likely the episode still runs when each component begins.
+        chances: `[..., A, N]` for each reward that ever came, how likely each step pays it; empty
+            where many did, or w > 1.
+        parts: `[..., A, N+1]` each, the parts that add up to the reward, discounted.
+        events: `[..., A, N]` each, how likely something happens in each component.
+        amounts: `[..., A, N+1]` each, of something else that is counted, discounted.
+    """
+
+    variance: FloatArray
+    survival: FloatArray
+    chances: Mapping[float, FloatArray]
+    parts: Mapping[str, FloatArray]
+    events: Mapping[str, FloatArray]
+    amounts: Mapping[str, FloatArray]
 
 
 class Unfitted:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import trdlab
 from trdlab.cli import main
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.policies import EpsilonGreedy
-from trdlab.training.fitted import load_fit
+from trdlab.training.fitted import Stopped, load_fit
 
 QUICK = {"horizon": 3, "steps": 4_000, "most_updates": 400, "learning_rate": 0.01}
 
@@ -43,7 +44,10 @@ def test_a_fit_says_how_far_it_can_be_trusted_and_where_it_is(tmp_path, monkeypa
     assert code == 0
     assert "After the first action, the agent's own policy acts." in page
     code, _, err = run(capsys, *words, "--out", "fits/ledge-N3-w1")
-    assert (code, err) == (2, "error: 'fits/ledge-N3-w1' exists. Choose another --out.\n")
+    assert (code, err) == (
+        2,
+        "error: 'fits/ledge-N3-w1' holds a fit that is done. Choose another --out.\n",
+    )
 
 
 @pytest.mark.parametrize("text", ["soon", "0", "10 days"])
@@ -60,7 +64,6 @@ def test_what_is_kept_is_what_was_fitted(kept: Path):
     assert estimator.decompose(states).components.tobytes() == told.tobytes()
     assert estimator.future == fitted.estimator.future
     assert interface.action_names == fitted.action_names
-    assert whose is not None
     assert (whose.agent, whose.env) == ("gridworld:ledge", None)
     again = trdlab.agent(str(kept))
     assert (again.name, again.estimator.time_axis) == ("ledge", trdlab.TimeAxis(0.95, 3))
@@ -76,6 +79,20 @@ def test_an_agent_without_a_name_is_kept_and_named_in_python(tmp_path):
         trdlab.agent(str(tmp_path / "mine"))
 
 
+def test_who_acts_is_the_same_when_it_is_found_again(tmp_path):
+    agent = trdlab.agent("gridworld:bridge", gamma=0.1)  # to whom the far bank is worth nothing
+    fitted = trdlab.fit(agent, out=tmp_path / "fit", **QUICK)  # type: ignore[arg-type]
+    again, states = trdlab.agent(str(tmp_path / "fit")), np.arange(8)
+    for one in (fitted, again):
+        assert one.policy.act(states, None, None)[0].tolist() == (  # type: ignore[union-attr]
+            agent.policy.act(states, None, None)[0].tolist()  # type: ignore[union-attr]
+        )
+    other = trdlab.agent("gridworld:bridge")
+    assert other.policy.act(states, None, None)[0].tolist() != (  # type: ignore[union-attr]
+        again.policy.act(states, None, None)[0].tolist()  # type: ignore[union-attr]
+    )
+
+
 def test_another_policy_is_another_agent_and_has_not_its_name(tmp_path):
     agent = trdlab.agent("gridworld:ledge", horizon=2)
     stumbling = trdlab.agent(agent, policy=EpsilonGreedy(agent.policy, 0.3))
@@ -85,21 +102,77 @@ def test_another_policy_is_another_agent_and_has_not_its_name(tmp_path):
 
 
 def test_nothing_is_replaced_and_what_is_torn_is_named(kept: Path, tmp_path):
-    with pytest.raises(OutputError, match=r"exists\. Choose another `out`\."):
+    with pytest.raises(OutputError, match=r"holds a fit that is done\. Choose another `out`\."):
         trdlab.fit("gridworld:ledge", out=kept, **QUICK)  # type: ignore[arg-type]
     torn = tmp_path / "torn"
-    torn.mkdir()
-    data = json.loads((kept / "fit.json").read_text())
-    (torn / "fit.json").write_text(json.dumps({**data, "hidden": [7]}))
-    (torn / "weights.safetensors").write_bytes((kept / "weights.safetensors").read_bytes())
-    with pytest.raises(TrdlabError, match=r"torn' is torn: The weights are of another network"):
-        trdlab.load(torn)
-    (torn / "fit.json").write_text(json.dumps({**data, "schema": "trdlab.fit/9"}))
-    with pytest.raises(TrdlabError, match=r"schema 'trdlab\.fit/9', and this version reads"):
-        trdlab.load(torn)
-    (torn / "fit.json").write_text('{"schema": "trdlab.fit/1"}')
+    shutil.copytree(kept, torn)
+    manifest = json.loads((torn / "manifest.json").read_text())
+    (torn / "manifest.json").write_text(json.dumps({**manifest, "fit": {}}))
     with pytest.raises(TrdlabError, match="does not say what was fitted: it is torn"):
         trdlab.agent(str(torn))
+    (torn / "manifest.json").write_text(json.dumps(manifest))
+    (weights,) = torn.glob("checkpoints/*/q_network.safetensors")
+    weights.write_bytes(weights.read_bytes()[:-1])
+    with pytest.raises(TrdlabError, match="torn"):
+        trdlab.load(torn)
+
+
+def test_a_fit_that_was_stopped_goes_on_with_the_same_bits(kept: Path, tmp_path, capsys):
+    path, asked = tmp_path / "ledge", 0
+
+    def later() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked > 3  # twice while it plays, then at the second look
+
+    with pytest.raises(Stopped, match=r"Stopped at \d+ updates\."):
+        trdlab.fit("gridworld:ledge", out=path, should_stop=later, **QUICK)  # type: ignore[arg-type]
+    assert trdlab.load(path).time_axis.horizon == 3, "the best of it so far"
+    with pytest.raises(InputError, match=r"was begun with steps = 4000, and this has 5000\."):
+        trdlab.fit("gridworld:ledge", out=path, **{**QUICK, "steps": 5_000})  # type: ignore[arg-type]
+    code, out, _ = run(capsys, "resume", path)
+    assert code == 0
+    assert "the agent's forecasts" in out
+    weights = "checkpoints/*/q_network.safetensors"
+    (one,), (other,) = kept.glob(weights), path.glob(weights)
+    assert one.read_bytes() == other.read_bytes()
+    assert not list((path / "replay").iterdir()), "what was played is not needed any more"
+
+
+def test_a_fit_that_was_stopped_while_it_played_begins_again(tmp_path):
+    path = tmp_path / "ledge"
+    with pytest.raises(Stopped, match="before anything was learned"):
+        trdlab.fit("gridworld:ledge", out=path, should_stop=lambda: True, **QUICK)  # type: ignore[arg-type]
+    with pytest.raises(TrdlabError, match=r"Nothing has been learned yet .* trdlab resume"):
+        trdlab.load(path)
+    assert trdlab.fit("gridworld:ledge", out=path, **QUICK).is_fitted  # type: ignore[arg-type]
+
+
+def test_what_was_given_in_python_goes_on_in_python(tmp_path, capsys):
+    given = {"fell": lambda step: step.terminated}
+    stopped = {"out": tmp_path / "fit", "should_stop": lambda: True, "outcomes": given, **QUICK}
+    with pytest.raises(Stopped):
+        trdlab.fit("gridworld:ledge", **stopped)  # type: ignore[arg-type]
+    code, _, err = run(capsys, "resume", tmp_path / "fit")
+    assert code == 2
+    assert "The outcomes of" in err
+    assert "were given in Python. Go on there: trdlab.fit" in err
+
+
+def test_outcomes_are_named_on_the_command_line(tmp_path, capsys):
+    words = ("fit", "gridworld:ledge", "--N", 2, "--steps", 2_000, "--time", "1s")
+    out = ("--out", tmp_path / "fit")
+    parts = ("--part", "coin=info.parts.coin", "--part", "hazard=info.parts.hazard")
+    code, _, _ = run(capsys, *words, *parts, "--outcome", "fell=info.parts.hazard", *out)
+    assert code == 0
+    outlook = trdlab.load(tmp_path / "fit").outlook(np.arange(3))
+    assert outlook is not None
+    assert (list(outlook.parts), list(outlook.amounts)) == (["coin", "hazard"], ["fell"])
+    code, _, err = run(capsys, *words, "--outcome", "row")
+    assert (code, err) == (2, "error: The outcome is 'row'. Write it as NAME=info.KEY.\n")
+    code, _, err = run(capsys, *words, "--part", "coin=info.parts.coin")
+    assert code == 2
+    assert "The parts do not add up to the reward" in err
 
 
 def test_who_knows_nothing_yet_is_told_how_to_find_out(tmp_path):

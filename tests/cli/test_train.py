@@ -22,7 +22,7 @@ import pytest
 import torch
 from rich.console import Console
 
-from trdlab.agents.runs import run_agent
+from trdlab.agents import find_agent
 from trdlab.cli import main
 from trdlab.cli.options import flag
 from trdlab.cli.progress import EpisodeProgress, TrainingProgress, stopping
@@ -334,7 +334,7 @@ def test_actions_are_called_as_people_say(trdlab, tmp_path):
     assert trdlab(*words, tmp_path / "run", "--action-names", "push left, push right")[0] == 0
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     assert manifest["environment"]["action_names"] == ["push left", "push right"]
-    assert run_agent(tmp_path / "run").action_names == ("push left", "push right")
+    assert find_agent(str(tmp_path / "run")).action_names == ("push left", "push right")
     assert trdlab("resume", tmp_path / "run")[0] == 0
     for names, message in (
         ("left,right,up", "There are 3 names for 2 actions: left, right, up. Give one for each"),

@@ -9,13 +9,18 @@ from hypothesis import strategies as st
 
 import trdlab
 from trdlab.bellman import target as law
+from trdlab.deep.channels import Channel, groups_of
 from trdlab.deep.experience import Ahead, Experience, gather
-from trdlab.deep.fit import Fit, FitSettings
+from trdlab.deep.fit import Fit
+from trdlab.deep.fit_settings import FitSettings
+from trdlab.environments.outcomes import Outcomes
 from trdlab.errors import InputError
 from trdlab.estimator import Future
+from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
 from trdlab.tabular import MDP, exact
 from trdlab.tabular.episodes import ModelEnvironments
+from trdlab.tabular.uncertainty import spread
 from trdlab.time_axis import TimeAxis
 
 FUTURE = Future("the agent's own policy")
@@ -32,10 +37,16 @@ def experience(rewards: list[float], until: list[int], *, ended: bool = True) ->
         probabilities=np.full((count, 2), 0.5),
         actions=np.zeros(count, dtype=np.int64),
         rewards=np.array([*rewards, 0.0]),
+        outcomes=np.zeros((count, 0)),
         ends=ends,
         until=np.array([*until, FAR]),
         last=np.full(count, count - 1),
     )
+
+
+def ahead_of(of: Experience, rows: list[int], axis: TimeAxis) -> Ahead:
+    """What followed some rows in a single channel, the reward."""
+    return of.ahead(np.array(rows), axis, groups_of(of, (Channel("reward"),), (), axis))
 
 
 # ---- what followed a step ------------------------------------------------------------------------
@@ -44,8 +55,8 @@ def experience(rewards: list[float], until: list[int], *, ended: bool = True) ->
 def test_what_came_is_known_as_far_as_the_policy_acted():
     axis = TimeAxis(0.5, 3)
     of = experience([1.0, 2.0, 4.0, 8.0], until=[2, 2, FAR, FAR])  # at step 2 it was forced
-    ahead = of.ahead(np.array([0, 1, 2]), axis)
-    assert ahead.rewards.tolist() == [[1.0, 1.0, 0.0], [2.0, 0.0, 0.0], [4.0, 4.0, 0.0]]
+    ahead = ahead_of(of, [0, 1, 2], axis)
+    assert ahead.came[:, 0].tolist() == [[1.0, 1.0, 0.0], [2.0, 0.0, 0.0], [4.0, 4.0, 0.0]]
     assert ahead.span.tolist() == [2, 1, 3]
     assert ahead.over.tolist() == [False, False, True]
     assert ahead.follows.tolist() == [2, 2, 4]
@@ -56,33 +67,33 @@ def test_what_came_is_known_as_far_as_the_policy_acted():
 def test_what_would_have_been_forced_after_the_end_is_not_known_either():
     """Else episodes that ended would count, and those that went on until then would not."""
     axis = TimeAxis(0.5, 3)
-    ahead = experience([1.0], until=[2]).ahead(np.array([0]), axis)
+    ahead = ahead_of(experience([1.0], until=[2]), [0], axis)
     assert ahead.over.tolist() == [True]
     assert ahead.known(axis).tolist() == [[True, True, False]]
-    nothing = ahead.target(axis, np.full((1, 4), 7.0))
-    assert nothing.tolist() == [[1.0, 0.0, 0.0, 0.0]], "nothing is to come after an end"
+    nothing = ahead.target(axis, np.full((1, 1, 4), 7.0))
+    assert nothing.tolist() == [[[1.0, 0.0, 0.0, 0.0]]], "nothing is to come after an end"
 
 
 def test_a_cut_episode_goes_on_in_what_is_expected():
     axis = TimeAxis(0.5, 2)
-    ahead = experience([1.0], until=[FAR], ended=False).ahead(np.array([0]), axis)
+    ahead = ahead_of(experience([1.0], until=[FAR], ended=False), [0], axis)
     assert (ahead.span[0], ahead.follows[0], ahead.over[0]) == (1, 1, False)
-    assert ahead.target(axis, np.array([[2.0, 4.0, 6.0]])).tolist() == [[1.0, 1.0, 5.0]]
+    assert ahead.target(axis, np.array([[[2.0, 4.0, 6.0]]])).tolist() == [[[1.0, 1.0, 5.0]]]
 
 
 def test_groups_are_known_as_a_whole_or_not():
     axis = TimeAxis(0.5, 2, 2)
     of = experience([1.0, 2.0, 4.0, 8.0, 16.0], until=[3, 3, FAR, FAR, FAR])
-    ahead = of.ahead(np.array([0, 2]), axis)
+    ahead = ahead_of(of, [0, 2], axis)
     assert ahead.span.tolist() == [1, 2]
-    assert ahead.rewards.tolist() == [[2.0, 0.0], [8.0, 4.0]]
+    assert ahead.came[:, 0].tolist() == [[2.0, 0.0], [8.0, 4.0]]
     assert ahead.known(axis).tolist() == [[True, False], [True, True]]
 
 
 def test_without_components_it_is_the_target_of_a_value():
     axis = TimeAxis(0.5, 0)
-    ahead = experience([1.0, 2.0], until=[FAR, FAR]).ahead(np.array([0, 1]), axis)
-    assert ahead.target(axis, np.array([[8.0], [8.0]])).tolist() == [[5.0], [2.0]]
+    ahead = ahead_of(experience([1.0, 2.0], until=[FAR, FAR]), [0, 1], axis)
+    assert ahead.target(axis, np.full((2, 1, 1), 8.0)).tolist() == [[[5.0]], [[2.0]]]
 
 
 @settings(max_examples=60, deadline=None)
@@ -97,8 +108,9 @@ def test_a_target_is_the_law_applied_as_often_as_rewards_are_known(horizon, span
     rewards = np.zeros((1, horizon))
     rewards[0, :span] = paid * gamma ** np.arange(span)
     one = np.array([span])
-    ahead = Ahead(rewards, one, np.array([False]), one, one)
-    np.testing.assert_allclose(ahead.target(axis, following), by_law, rtol=1e-9, atol=1e-12)
+    ahead = Ahead(rewards[:, None], one, np.array([False]), one, one)
+    told = ahead.target(axis, following[:, None])[:, 0]
+    np.testing.assert_allclose(told, by_law, rtol=1e-9, atol=1e-12)
 
 
 # ---- playing -------------------------------------------------------------------------------------
@@ -162,20 +174,83 @@ def test_what_cannot_be_played_is_refused(steps: int, share: float):
 )
 def test_each_method_finds_the_exact_components_of_actions_it_never_takes_too(method, width):
     axis = TimeAxis(0.9, 4, width)
-    of = played(steps=100_000, pause=axis.num_steps if method == "regression" else 0)
-    how = FitSettings(method, learning_rate=0.01, batch_size=1024, most_updates=4_000)
+    of = played(steps=80_000, pause=axis.num_steps if method == "regression" else 0)
+    how = FitSettings(method, learning_rate=0.01, batch_size=512, most_updates=2_000)
     fit = Fit(of, gym.spaces.Discrete(4), axis, how)
-    fit.run()
+    while not fit.done:
+        fit.learn()
     told = fit.estimator(FUTURE).decompose(np.arange(3)).components
     true = exact(walk(), axis, policy=POLICY)
     largest = np.abs(true.solution.q_values).max()
     np.testing.assert_allclose(told, true.decomposition.components[:3], atol=0.03 * largest)
+    outlook, known = fit.estimator(FUTURE).outlook(np.arange(3)), spread(true)
+    assert outlook is not None
+    np.testing.assert_allclose(outlook.survival, known.survival[:3], atol=0.03)
+    np.testing.assert_allclose(outlook.variance, known.variance[:3, :, :-1], atol=0.03 * largest)
+
+
+def test_parts_add_up_and_each_is_what_the_exact_table_of_it_says():
+    world = Gridworld(load_map("ledge").with_slip(0.2))
+    axis, mdp = TimeAxis(0.9, 4), world.mdp
+    rng = np.random.default_rng(0)
+    policy = rng.dirichlet(np.ones(4), mdp.num_states)  # [S, A]
+    alive = ~mdp.terminal_states
+    of = gather(
+        lambda count, own: ModelEnvironments(
+            mdp, count, seed=own, starts=alive / alive.sum(), time_limit=100, parts=world.parts
+        ),
+        Memoryless(lambda states: policy[states]),
+        FUTURE,
+        steps=200_000,
+        share=0.2,
+        num_envs=500,
+        outcomes=Outcomes(
+            {name: f"info.parts.{name}" for name in world.parts}
+            | {"fell": lambda step: step.info["parts"]["hazard"] < 0.0}
+        ),
+    )
+    how = FitSettings(batch_size=512, most_updates=2_000)
+    names, parts = (*world.parts, "fell"), tuple(world.parts)
+    fit = Fit(of, gym.spaces.Discrete(mdp.num_states), axis, how, names=names, parts=parts)
+    while not fit.done:
+        fit.learn()
+    estimator, states = fit.estimator(FUTURE), np.flatnonzero(alive)
+    outlook = estimator.outlook(states)
+    assert outlook is not None
+    told = estimator.decompose(states).components
+    np.testing.assert_allclose(sum(outlook.parts.values()), told, rtol=1e-6, atol=1e-6)
+    scale = 0.03 * np.abs(exact(mdp, axis, policy=policy).solution.q_values).max()
+    for name, paid in world.parts.items():
+        true = exact(mdp.with_rewards(paid), axis, policy=policy).decomposition.components[alive]
+        np.testing.assert_allclose(outlook.parts[name], true, atol=scale)
+    fell = exact(mdp.with_rewards((world.parts["hazard"] < 0.0) * 1.0), axis, policy=policy)
+    chances = fell.decomposition.components[alive][..., :-1] / axis.discounts[:-1]
+    np.testing.assert_allclose(outlook.events["fell"], chances, atol=0.03)
+
+
+def test_a_fit_that_was_stopped_goes_on_to_the_bit():
+    of, how = played(steps=3_000), FitSettings(most_updates=600, batch_size=64)
+
+    def begun() -> Fit:
+        return Fit(of, gym.spaces.Discrete(4), TimeAxis(0.9, 3), how)
+
+    whole, first, second = begun(), begun(), begun()
+    while not whole.done:
+        whole.learn()
+    first.learn()
+    second.load_state_dict(first.state_dict())
+    while not second.done:
+        second.learn()
+    assert (second.num_updates, second.best) == (whole.num_updates, whole.best)
+    for one, other in zip(whole.network.parameters(), second.network.parameters(), strict=True):
+        assert one.detach().numpy().tobytes() == other.detach().numpy().tobytes()
 
 
 def test_without_components_the_value_of_the_policy_is_learned():
-    how = FitSettings(learning_rate=0.01, batch_size=1024, most_updates=4_000)
+    how = FitSettings(learning_rate=0.01, batch_size=512, most_updates=2_000)
     fit = Fit(played(steps=60_000), gym.spaces.Discrete(4), TimeAxis(0.9, 0), how)
-    fit.run()
+    while not fit.done:
+        fit.learn()
     told = fit.estimator(FUTURE).decompose(np.arange(3)).value
     true = exact(walk(), TimeAxis(0.9, 0), policy=POLICY).solution.q_values[:3]
     np.testing.assert_allclose(told, true, atol=0.03 * np.abs(true).max())
@@ -193,11 +268,16 @@ def test_the_same_seed_learns_the_same_bits():
 
 def test_nothing_is_told_that_no_reward_allows():
     fit = Fit(played(steps=3_000), gym.spaces.Discrete(4), TimeAxis(0.9, 2))
+    estimator = fit.estimator(FUTURE)
     with torch.no_grad():
-        fit.network.head.bias += 100.0
-    told = fit.estimator(FUTURE).decompose(np.arange(4)).components
+        estimator.network.head.bias += 100.0
+    told = estimator.decompose(np.arange(4)).components
     most = [1.0, 0.9, 0.81 / 0.1]  # if every step paid 1, the most that one did
-    np.testing.assert_allclose(told.max(axis=(0, 1)), most, rtol=1e-6)
+    assert (told <= np.array(most) * (1.0 + 1e-6)).all()
+    outlook = estimator.outlook(np.arange(4))
+    assert outlook is not None
+    assert sorted(outlook.chances) == [-0.2, 0.5, 1.0]
+    np.testing.assert_allclose(sum(outlook.chances.values()), 1.0, rtol=1e-6)
 
 
 def test_wrong_settings_are_refused():

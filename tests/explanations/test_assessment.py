@@ -18,7 +18,6 @@ from trdlab.environments import Environments, GymEnvironments
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations import assess, check, explain, moment_at, try_out
-from trdlab.explanations.assessment import judged
 from trdlab.explanations.calibration import claims as calibration
 from trdlab.explanations.calibration.faults import faults
 from trdlab.explanations.moment.moment import CHOICES, Choice
@@ -100,7 +99,7 @@ def test_what_is_wrong_from_some_step_on_is_marked_in_every_explanation():
     assert report.trust.last_step == 1
     assert report.trust.doubtful.tolist() == [False, False, True, True, True]
     moment = moment_at(agent)
-    choice = judged(moment, report).choice("right", "up")
+    choice = replace(moment, calibration=report.calibration).choice("right", "up")
     off = np.abs(moment.difference("right", "up"))
     (doubt,) = (claim for claim in moments.told(choice) if claim.kind == "untested-difference")
     assert doubt.components == (2, 3, 4)

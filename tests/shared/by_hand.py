@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.calibration import Trust
 from trdlab.rollouts.episodes import Episode
 from trdlab.tabular import ExactTable, exact
 from trdlab.tabular.uncertainty import spread
@@ -64,12 +63,6 @@ def occupancy(table: ExactTable) -> FloatArray:
     begin = np.eye(mdp.num_states)[mdp.start]
     states: FloatArray = np.linalg.solve(np.eye(mdp.num_states) - chain, begin)
     return states[:, None] * policy
-
-
-def trusted(axis: TimeAxis, components: int, residual: bool = False) -> Trust:
-    """Returns that so many explicit components are good, and the others bad."""
-    explicit = ["good"] * components + ["bad"] * (axis.horizon - components)
-    return Trust(axis, (*explicit, "good" if residual else "bad"))  # type: ignore[arg-type]
 
 
 def exact_ceiling(table: ExactTable, visits: FloatArray) -> FloatArray:

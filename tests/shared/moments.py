@@ -1,17 +1,20 @@
 """Moments that tests write down, and what is told of them."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.calibration import Trust
+from trdlab.explanations.calibration.calibration import Calibration, Reliability, Status
 from trdlab.explanations.moment.exact import gridworld_moment
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.telling import sections
 from trdlab.explanations.rules import Claim
 from trdlab.gridworld import Gridworld, load_map
+from trdlab.statistics import Estimates
 from trdlab.tabular import exact
 
 GAMMA = 0.95
@@ -24,11 +27,40 @@ def moment(rows: list[list[float]], width: int = 1, gamma: float = GAMMA, **know
     return Moment(parts, tuple("abcd"[: len(rows)]), Future("the optimal policy"), **known)
 
 
-def trusted(axis: TimeAxis, components: int, residual: bool = False) -> Trust:
-    """How far such forecasts can be trusted: so many explicit components, and the residual."""
-    bad = axis.horizon - components
-    status = (*("good",) * components, *("bad",) * bad, "good" if residual else "bad")
-    return Trust(axis, status)  # type: ignore[arg-type]
+def trusted(axis: TimeAxis, components: int, residual: bool = False, **known: Any) -> Calibration:
+    """Forecasts of which so many explicit components are good, and the residual."""
+    explicit = ("good",) * components + ("bad",) * (axis.horizon - components)
+    return calibrated(axis, (*explicit, "good" if residual else "bad"), **known)
+
+
+def calibrated(
+    axis: TimeAxis,
+    status: tuple[Status, ...] | None = None,
+    off_by: Sequence[float] | FloatArray | None = None,
+    only_reward: float | None = None,
+) -> Calibration:
+    """What is known of forecasts, by default that they are good, and not what they are off by."""
+    size = axis.num_components
+    unknown, none = np.full(size, np.nan), np.zeros(0)
+    error = unknown if off_by is None else np.square(off_by)
+    return Calibration(
+        time_axis=axis,
+        status=("good",) * size if status is None else status,
+        constant=np.zeros(size, dtype=np.bool_),
+        num_samples=np.full(size, 500),
+        num_episodes=np.full(size, 50),
+        enough=(None,) * size,
+        bias=Estimates(unknown, unknown, unknown),
+        error=Estimates(error, error, error),
+        mean=unknown,
+        variance=unknown,
+        skill=Estimates(unknown, unknown, unknown),
+        predicted_range=np.zeros((2, size + 1)),
+        observed_range=np.zeros((2, size + 1)),
+        reliability=None
+        if only_reward is None
+        else Reliability(only_reward, none.astype(np.int64), none, none),
+    )
 
 
 def choice(

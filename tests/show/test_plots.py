@@ -22,12 +22,12 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
+from moments import calibrated
 from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, OutputError
 from trdlab.estimator import Future
 from trdlab.explanations import Explanation, explain, solve_state
-from trdlab.explanations.calibration.calibration import Trust
 from trdlab.explanations.moment.exact import tabular_moment
 from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty
 from trdlab.explanations.solved import SolvedState
@@ -52,17 +52,13 @@ AXIS = TimeAxis(0.9, 3)
 
 
 def moment(rows: object, axis: TimeAxis = AXIS, **known: object) -> Moment:
-    known = {"error": np.array([0.2, 0.3, np.nan, 0.0])} | known
-    found = Moment(
-        RewardDecomposition(np.array(rows, float), axis),
-        ("go", "stay"),
-        Future("the greedy policy"),
-        **known,  # type: ignore[arg-type]
-    )
-    return replace(found, error=None) if axis != AXIS else found
+    found = RewardDecomposition(np.array(rows, float), axis)
+    return Moment(found, ("go", "stay"), Future("the greedy policy"), **known)  # type: ignore[arg-type]
 
 
-LEARNED = moment([[0.1, 0.5, 0.2, 0.0], [0.3, 0.4, 0.2, 0.1]])
+OFF_BY = [0.2, 0.3, np.nan, 0.0]
+UNJUDGED = moment([[0.1, 0.5, 0.2, 0.0], [0.3, 0.4, 0.2, 0.1]])
+LEARNED = replace(UNJUDGED, calibration=calibrated(AXIS, off_by=OFF_BY))
 
 
 @cache
@@ -124,11 +120,12 @@ def test_whiskers_of_an_exact_table_are_standard_deviations():
     ax = plot_action(Figure().subplots(), replace(LEARNED, uncertainty=known), "go")
     np.testing.assert_allclose(whisker_ends(ax), [(-0.3, 0.5)])
     assert whiskers(replace(LEARNED, uncertainty=known)) == "one standard deviation"
-    assert whiskers(replace(LEARNED, error=None)) == ""
+    assert whiskers(UNJUDGED) == ""
 
 
 def test_whiskers_end_where_no_reward_can_be():
-    ax = plot_action(Figure().subplots(), replace(LEARNED, only_reward=1.0), "go")
+    pays_one = replace(UNJUDGED, calibration=calibrated(AXIS, off_by=OFF_BY, only_reward=1.0))
+    ax = plot_action(Figure().subplots(), pays_one, "go")
     np.testing.assert_allclose(whisker_ends(ax), [(0.0, 0.3), (0.2, 0.8)])
     lake = solved_figure(solved()["FrozenLake"])
     assert min(low for ax in lake.axes for low, _ in whisker_ends(ax)) == 0.0
@@ -137,7 +134,7 @@ def test_whiskers_end_where_no_reward_can_be():
 
 
 def test_a_whisker_much_longer_than_the_bars_is_cut_off_and_says_where_it_ends():
-    long = replace(LEARNED, error=np.array([0.2, 0.3, 0.1, 17.5]))
+    long = replace(UNJUDGED, calibration=calibrated(AXIS, off_by=[0.2, 0.3, 0.1, 17.5]))
     ax = plot_action(Figure().subplots(), long, "go")
     assert max(heights(ax)) / ax.get_ylim()[1] > 0.4, "the bars can be seen"
     assert cut_texts(ax) == ["−17.50", "17.50"]
@@ -150,7 +147,8 @@ def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
     assert heights(action) == [1.0, 0.9, 1.5]
     assert heights(foil) == [1.0, -0.8, 1.5]
     assert [cut_texts(ax) for ax in (action, foil, contrast)] == [["94.50"], ["2.00"], ["92.50"]]
-    unsure = replace(found, error=np.array([0.1, 0.1, 6.0]))  # its whisker is beyond the scale, too
+    off_by = [0.1, 0.1, 6.0]  # its whisker is beyond the scale, too
+    unsure = replace(found, calibration=calibrated(found.time_axis, off_by=off_by))
     assert cut_texts(moment_figure(Choice(unsure, "go", "stay")).axes[0]) == ["94.50"]
 
 
@@ -185,7 +183,8 @@ numbers = st.one_of(st.floats(-2.0, 2.0, width=32), st.sampled_from([0.0, 1e-17,
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(arrays(float, (2, 4), elements=numbers), arrays(float, 4, elements=numbers))
 def test_nothing_is_drawn_outside_the_axes_and_whatever_is_cut_off_has_its_number(rows, error):
-    found, ends = moment(rows, error=np.abs(error)), rows[0] + np.outer([-1, 1], np.abs(error))
+    found = moment(rows, calibration=calibrated(AXIS, off_by=error))
+    ends = rows[0] + np.outer([-1, 1], np.abs(error))
     ax = plot_action(Figure().subplots(), found, "go")
     assert_inside(ax)
     assert_inside(plot_contrast(Figure().subplots(), found, "go", "stay"))
@@ -239,9 +238,9 @@ def test_a_route_has_the_colour_of_its_action_and_directions_the_same_in_every_w
 
 
 def test_what_is_bad_and_what_is_not_tested_stand_on_different_ground():
-    trust = Trust(AXIS, ("good", "bad", "open", "good"))
-    of_foils = Trust(AXIS, ("good", "good", "good", "not tested"))
-    judged = replace(LEARNED, trust=trust, foil_trust=of_foils, policy=np.array([1.0, 0.0]))
+    own = calibrated(AXIS, ("good", "bad", "open", "good"))
+    of_foils = calibrated(AXIS, ("good", "good", "good", "not tested"))
+    judged = replace(LEARNED, calibration=own, foils=of_foils, policy=np.array([1.0, 0.0]))
     figure = moment_figure(Choice(judged, "go", "stay"))
     grounds = [
         [to_hex(patch.get_facecolor()) for patch in ax.patches if patch not in bars(ax)]

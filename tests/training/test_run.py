@@ -391,6 +391,59 @@ def test_the_best_checkpoint_is_named_by_all(trained, trdlab):
     assert trdlab("resume", f"{trained}@best")[0] == 0
 
 
+PLAYED = {"checkpoint_episodes": 3, "evaluate_epsilon": 0.5}
+
+
+def played(out: Path) -> dict[int, float]:
+    """Returns the mean return of each checkpoint that was evaluated."""
+    kept = [json.loads(file.read_text()) for file in (out / "evaluations").iterdir()]
+    assert {(each["episodes"], each["epsilon"], each["seed"]) for each in kept} == {(3, 0.5, 2000)}
+    return {each["agent_steps"]: each["mean"]["value"] for each in kept}
+
+
+def test_episodes_that_choose_the_agent_change_nothing_else(tmp_path):
+    plain, out = train(tmp_path / "plain"), train(tmp_path / "run", **PLAYED)
+    assert result(out) == result(plain)
+    means = played(out)
+    assert sorted(means) == [30, 60, 90, 120]
+    best = max((mean, step) for step, mean in means.items())[1]
+    assert best_step(RunFolder.open(out)) == best
+    assert not list((plain / "evaluations").iterdir())
+
+
+def test_the_agent_is_the_best_where_checkpoints_are_played(tmp_path, trdlab):
+    lines = LINES | {"checkpoint_episodes": 3, "evaluate_episodes": 2, "checkpoint_every": 20}
+    file = written(tmp_path, TrainSettings("gym", "CartPole-v1").changed(lines))
+    out = tmp_path / "run"
+    words = ("train", "gym", "CartPole-v1", "--config", file, "--out", out)
+    err = trdlab(*words, "--learning-rate", 0.1)[2]
+    best = best_step(RunFolder.open(out))
+    assert best is not None
+    assert best < 120
+    assert (
+        f"Its agent is that of {best} agent steps, the best in 3 episodes; the last is {out}@120."
+    ) in err.splitlines()
+    assert (out / "evaluations" / f"step-{best}-episodes-2-epsilon-0-seed-1000.json").exists()
+    agents = [load(out, step) for step in (None, best, 120)]
+    seen = np.zeros((1, 4), dtype=np.float32)
+    own, of_best, last = (agent.decompose(seen).components for agent in agents)
+    assert np.array_equal(own, of_best)
+    assert not np.array_equal(own, last)
+    with resume(out) as run:  # which goes on with the last
+        assert run.trainer.agent_steps == 120
+
+
+def test_where_a_run_was_stopped_does_not_choose_its_agent(tmp_path):
+    with begin(settings(**PLAYED), tmp_path / "run") as run:
+        assert not carry_on(run, should_stop=lambda: run.trainer.agent_steps == 47)
+    assert checkpoint_steps(run.folder) == [30, 47]
+    assert sorted(played(run.folder.path)) == [30]
+    assert best_step(run.folder) == 30
+    whole = train(tmp_path / "whole", **PLAYED)
+    assert result(finish(run.folder.path)) == result(whole)
+    assert played(run.folder.path) == played(whole)
+
+
 # ---- refused -------------------------------------------------------------------------------------
 
 

@@ -54,6 +54,7 @@ class Model:
             starts=self.starts,
             time_limit=self.time_limit or max(_usual_limit(self.world), 4 * time_axis.num_steps),
             action_names=self.world.action_names,
+            parts=self.world.parts if isinstance(self.world, Gridworld) else None,
         )
 
 

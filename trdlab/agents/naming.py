@@ -1,4 +1,4 @@
-"""What a word names: a run, a checkpoint of it, or the exact table of a model."""
+"""What a word names: a run, a fit, a file of another library, or the exact table of a model."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -6,17 +6,33 @@ from pathlib import Path
 from typing import Any
 
 from trdlab.agents.agent import Agent
-from trdlab.agents.exact import exact_agent
-from trdlab.agents.models import GRIDWORLD, TABULAR, is_model
-from trdlab.agents.outside import file_agent
-from trdlab.agents.places import AXIS, Origin, Where, changed
+from trdlab.agents.given import acting_agent, agent_of, model_agent
+from trdlab.agents.models import GRIDWORLD, TABULAR, find_model, is_model
+from trdlab.agents.places import (
+    AXIS,
+    Origin,
+    Where,
+    changed,
+    find_place,
+    look,
+    place_of,
+    refuse_arguments,
+)
+from trdlab.environments.arguments import parse_name
+from trdlab.environments.making import check_imported
+from trdlab.environments.naming import is_numbered
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
 from trdlab.policies import acting
+from trdlab.policies.adapted import About
+from trdlab.policies.files import Options
 from trdlab.policies.functions import PYTHON, from_python
+from trdlab.policies.registry import read_policy
+from trdlab.runs import RunFolder, find_checkpoint
+from trdlab.runs.folder import is_fit
 from trdlab.tabular.toytext import toy_text_ids
 from trdlab.time_axis import TimeAxis
-from trdlab.training.fitted import is_fit, load_fit
+from trdlab.training.fitted import load_fit
 
 _OWN_AXIS = "is a run with its own γ, N and w."
 _UNKNOWN_AXIS = "gets γ, N and w when it is fitted."
@@ -34,11 +50,12 @@ def find_agent(
 ) -> Agent:
     """Returns an agent by its name.
 
-    That is a run's folder, or `RUN@STEP` for an older checkpoint of it, or `RUN@best` for the one
-    of the best score; the folder of a fit; for the exact table of a model, `gridworld:NAME`, a map
-    file, or `tabular:ENV_ID`, each with what to make it with after commas, such as
-    `gridworld:ledge,slip=0.2`; a file of an agent that another library trained, or
-    `python:FILE.py:FUNCTION`, whose function makes one.
+    That is a run's folder, or `RUN@STEP` or `RUN@best` for another checkpoint of it; the folder of
+    a fit; for the exact table of a model, `gridworld:NAME`, a map file, or `tabular:ENV_ID`, each
+    with what to make it with after commas, such as `gridworld:ledge,slip=0.2`; a file of an agent
+    that another library trained, likewise with what it does not say, such as
+    `ppo.zip,activation=relu,greedy=true` (see `Options`); or `python:FILE.py:FUNCTION`, whose
+    function makes one.
 
     Args:
         name: of the agent.
@@ -52,40 +69,87 @@ def find_agent(
         InputError: there is no such agent, or something does not fit it.
         TrdlabError: a run is torn.
     """
-    where: dict[str, Any] = {"env": env, "env_arguments": env_arguments}
-    if name.startswith(PYTHON):
-        return _made(name, env, env_arguments, changed(AXIS, gamma, horizon, width))
-    if is_model(name):
-        called = name if name.startswith((GRIDWORLD, TABULAR)) else f"{GRIDWORLD}{name}"
-        axis = changed(AXIS, gamma, horizon, width)
-        return exact_agent(called, axis, **where)
+    if name.startswith(PYTHON) or is_model(name):
+        made = _made if name.startswith(PYTHON) else _exact
+        return made(name, env, env_arguments, changed(AXIS, gamma, horizon, width))
     _refuse_model(name)
     is_file = Path(name.partition(",")[0]).is_file()
     if (gamma, horizon, width) != (None, None, None):
         own = _UNKNOWN_AXIS if is_file else _OWN_AXIS
         raise InputError(f"'{name}' {own}", _LEAVE_OUT)
     if is_file:
-        return file_agent(name, **where)
+        return _read(name, env, env_arguments)
     if is_fit(Path(name)):
         return _fitted(name, env, env_arguments)
-    from trdlab.agents.runs import run_agent
-    from trdlab.runs import find_checkpoint
+    return _run(name, env, env_arguments)
+
+
+def gridworld_agent(map_name: str, time_axis: TimeAxis, **where: Any) -> Agent:
+    """Returns `find_agent` of a built-in map or a map file, on a time axis."""
+    return find_agent(GRIDWORLD + map_name.removeprefix(GRIDWORLD), **asdict(time_axis), **where)
+
+
+def tabular_agent(env_id: str, time_axis: TimeAxis, **where: Any) -> Agent:
+    """Returns `find_agent` of a Gymnasium environment with a transition table, on a time axis."""
+    return find_agent(TABULAR + env_id.removeprefix(TABULAR), **asdict(time_axis), **where)
+
+
+def _exact(name: str, env: Where | None, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:
+    """Returns the exact table of a model with a name as an agent that acts optimally in it."""
+    called = name if name.startswith((GRIDWORLD, TABULAR)) else f"{GRIDWORLD}{name}"
+    model = find_model(called)
+    if env is None:
+        refuse_arguments(called, env_arguments)
+        return replace(model_agent(model, axis), origin=Origin(called, called, (), axis))
+    place = find_place(env, env_arguments, axis)
+    agent = model_agent(model, axis, place=place)
+    return replace(agent, origin=place.origin(called, axis, away=True))
+
+
+def _run(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
+    """Returns the agent of a run, or of a checkpoint of it, in its own environments or others."""
+    from trdlab.training.loading import interface_of, load, run_settings
+    from trdlab.training.machine import use_threads
 
     path, step = find_checkpoint(name)
-    return run_agent(path, step=step, **where)
+    folder = RunFolder.open(path)
+    settings = run_settings(folder)
+    if env_arguments and env is None:
+        raise InputError("The run says what its environment is made with.", "Give `env` too.")
+    use_threads(settings)
+    estimator = load(path, step)
+    if env is None:
+        check_imported(settings.env)
+        place = place_of(settings)
+    else:
+        games = settings.kind == "atari"
+        place = find_place(env, env_arguments, settings.time_axis, games=games)
+    found, known = look(place.make), interface_of(folder)
+    known.check_fits(found, place.name)
+    at = "" if step is None else f"@{step}"
+    module = settings.env.rpartition(":")[0]
+    return Agent(
+        name=f"{folder.path.name}{at}",
+        estimator=estimator,
+        action_names=(known if is_numbered(found.action_names) else found).action_names,
+        make=place.make,
+        seconds_per_step=found.seconds_per_step,
+        origin=place.origin(f"{path}{at}", None, away=env is not None, module=module),
+        copying=place.copying,
+    )
 
 
 def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
     """Returns the agent of a fit, in a folder: who was fitted, with what was learned of it."""
     estimator, interface, whose = load_fit(Path(name))
-    if whose is None:
+    if whose.agent is None:
         raise InputError(
             f"'{name}' was fitted to an agent without a name.",
             "Give it in Python: trdlab.agent(trdlab.load(folder), env=…, policy=…).",
         )
     if env is None:
         env, env_arguments = whose.env, whose.env_arguments
-    of = find_agent(whose.agent, env=env, env_arguments=env_arguments)
+    of = find_agent(whose.agent, gamma=whose.solved_for, env=env, env_arguments=env_arguments)
     interface.check_fits(of.interface, str(env or whose.agent))
     policy = acting(of.policy or of.estimator)
     origin = of.origin and replace(of.origin, name=name, time_axis=None)
@@ -94,23 +158,34 @@ def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent
 
 def _made(name: str, env: Where | None, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:
     """Returns the agent that a function in a file of Python makes."""
-    from trdlab.agents.given import agent_of
-
     made = agent_of(from_python(name.removeprefix(PYTHON)), env, env_arguments, axis)
     if not isinstance(env, str):
         return made
     return replace(made, origin=Origin(name, env, tuple(env_arguments), None, away=True))
 
 
+def _read(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
+    """Returns the agent in a file of another library, named with what that does not say."""
+    file, arguments = parse_name(name)
+    path = Path(file)
+    policy = read_policy(path, Options.of(arguments))
+    if env is None:
+        about: About = getattr(policy, "about")  # noqa: B009  which every adapter gives
+        raise InputError(
+            f"Nothing says where '{file}' acts: it is a {about.title}.",
+            f"Give its `env`: it needs {about.needs}.",
+        )
+    place = find_place(env, env_arguments, AXIS)
+    agent = acting_agent(policy, place, path.stem)
+    return replace(agent, origin=place.origin(name, None, away=True))
+
+
 def _refuse_model(name: str) -> None:
     """Refuses the name of a model without its kind, where no run is called that."""
-    called = name.partition(",")[0]
-    if Path(name).exists():
-        return
-    if called in map_names():
-        raise InputError(f"There is no run '{name}'.", f"For the map: {GRIDWORLD}{name}")
-    if called in toy_text_ids():
-        raise InputError(f"There is no run '{name}'.", f"For the exact table: {TABULAR}{name}")
+    kinds = (("map", GRIDWORLD, map_names()), ("exact table", TABULAR, toy_text_ids()))
+    for what, kind, known in kinds:
+        if name.partition(",")[0] in known and not Path(name).exists():
+            raise InputError(f"There is no run '{name}'.", f"For the {what}: {kind}{name}")
 
 
 def find_pair(

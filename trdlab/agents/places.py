@@ -1,10 +1,10 @@
 """Where an agent acts: its own environments, or others that it is put into."""
 
 from collections.abc import Sequence
-from contextlib import closing
-from dataclasses import dataclass, replace
+from contextlib import closing, suppress
+from dataclasses import astuple, dataclass, replace
 from functools import partial
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import gymnasium as gym
 import numpy as np
@@ -18,7 +18,13 @@ from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.interface import Interface
 from trdlab.environments.sources import EnvSource
 from trdlab.errors import InputError
+from trdlab.rollouts.branches import Copying
 from trdlab.tabular import MDP
+
+if TYPE_CHECKING:
+    from trdlab.deep.settings import TrainSettings
+
+_OF_GAMES = Copying(episodes=12, moments=2, copies=2, tries=10)  # a copy plays all of a game again
 
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""
@@ -31,11 +37,8 @@ def changed(
     axis: TimeAxis, gamma: float | None, horizon: int | None, width: int | None
 ) -> TimeAxis:
     """Returns a time axis with those of γ, N and w in place that are given."""
-    return TimeAxis(
-        axis.gamma if gamma is None else gamma,
-        axis.horizon if horizon is None else horizon,
-        axis.width if width is None else width,
-    )
+    given: dict[str, Any] = {"gamma": gamma, "horizon": horizon, "width": width}
+    return replace(axis, **{name: value for name, value in given.items() if value is not None})
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,14 @@ class Origin:
     @property
     def words(self) -> tuple[str, ...]:
         """What names the agent on the command line."""
-        axis = self.time_axis or AXIS
-        own = (("--gamma", axis.gamma), ("--N", axis.horizon), ("--w", axis.width))
-        usual = (AXIS.gamma, AXIS.horizon, AXIS.width)
-        said = [(x, str(y)) for (x, y), z in zip(own, usual, strict=True) if y != z]
+        flags, own = ("--gamma", "--N", "--w"), astuple(self.time_axis or AXIS)
+        told = zip(flags, own, astuple(AXIS), strict=True)
+        said = [
+            word for flag, value, usual in told if value != usual for word in (flag, str(value))
+        ]
         needed = ("--import", self.module) if self.module and not self.away else ()
         place = self.place if self.away else ()
-        return (self.name, *(word for pair in said for word in pair), *needed, *place)
+        return (self.name, *said, *needed, *place)
 
     @property
     def place(self) -> tuple[str, ...]:
@@ -92,6 +96,7 @@ class Place:
         env_arguments: what it is made with, as `KEY=VALUE`.
         is_named: whether it can be found again by its name.
         mdp: the model that it is; None where it carries none.
+        copying: how much is copied of states there.
     """
 
     make: Make
@@ -99,6 +104,7 @@ class Place:
     env_arguments: tuple[str, ...] = ()
     is_named: bool = True
     mdp: MDP | None = None
+    copying: Copying = Copying()  # noqa: RUF009  it is frozen
 
     def is_model(self, mdp: MDP) -> bool:
         """Returns whether episodes here go as a model says."""
@@ -112,7 +118,9 @@ class Place:
         return Origin(agent, self.name, self.env_arguments, axis, **how) if self.is_named else None
 
 
-def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) -> Place:
+def find_place(
+    env: Where, env_arguments: Sequence[str], time_axis: TimeAxis, *, games: bool = False
+) -> Place:
     """Returns the place of a name, or of an environment.
 
     Args:
@@ -121,6 +129,7 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
             or a model. An environment is acted in even where it carries a model.
         env_arguments: what to make one of an id with, as `KEY=VALUE`.
         time_axis: of the agent; episodes of a model without a limit last four horizons or longer.
+        games: whether each name that is not of a model is meant to be that of an Atari game.
 
     Raises:
         InputError: there is no such model, or it is given arguments that are not in its name.
@@ -135,8 +144,10 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
         called = str(env) if named else model.name
         return Place(make, called, is_named=named, mdp=model.world.mdp)
     source: Any = env
-    if named and (game := _game(source)) is not None:
-        return Place(_games(game, env_arguments), source, tuple(env_arguments))
+    if named and (games or _is_game(source)):
+        from trdlab.deep.settings import TrainSettings
+
+        return place_of(TrainSettings("atari", source, env_arg=tuple(env_arguments)))
     arguments = parse_arguments(env_arguments)
 
     def made(num_envs: int, seed: int) -> GymEnvironments:
@@ -146,25 +157,24 @@ def find_place(env: Where, env_arguments: Sequence[str], time_axis: TimeAxis) ->
     return Place(made, called, tuple(env_arguments), named, _mdp_of(env))
 
 
-def _games(game: str, env_arguments: Sequence[str]) -> Make:
-    """Returns what makes games of Atari, as runs play them."""
-    from trdlab.deep.settings import TrainSettings
+def place_of(settings: "TrainSettings") -> Place:
+    """Returns where the agent of a run acts."""
     from trdlab.training.setup import make_environments
 
-    there = TrainSettings("atari", game, env_arg=tuple(env_arguments))
-    return lambda num_envs, seed: make_environments(there, num_envs=num_envs, seed=seed)
+    copying = _OF_GAMES if settings.kind == "atari" else Copying()
+    make = partial(make_environments, settings)
+    return Place(make, settings.env, settings.env_arg, copying=copying)
 
 
-def _game(env: str) -> str | None:
-    """Returns the Atari game that a word names; None where Gymnasium has an environment for it."""
+def _is_game(env: str) -> bool:
+    """Returns whether a word names an Atari game, and no other environment of Gymnasium."""
     if ":" in env or (env in gym.registry and not env.startswith("ALE/")):
-        return None
+        return False
     from trdlab.atari.names import find_game
 
-    try:
-        return find_game(env)
-    except InputError:
-        return None
+    with suppress(InputError):
+        return bool(find_game(env))
+    return False
 
 
 def _mdp_of(env: Any) -> MDP | None:

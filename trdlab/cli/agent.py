@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from trdlab.cli import common
 
@@ -34,15 +33,9 @@ def agent(
     greedy: Annotated[
         bool, typer.Option("--greedy", help="Take the likeliest action, where it would draw one.")
     ] = False,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")] = 0,
+    seed: common.EpisodesSeed = 0,
     max_steps: Annotated[
-        int | None,
-        typer.Option(
-            "--max-steps",
-            min=1,
-            help="After which an episode is cut off, if not before.",
-            show_default="the environment's limit, or else 1000",
-        ),
+        int | None, common.max_steps_option("the environment's limit, or else 1000")
     ] = None,
     modules: common.Import = None,
     as_json: common.AsJson = False,
@@ -58,7 +51,7 @@ def agent(
     from trdlab.show.training import evaluation_page
 
     found = find_agent(name, env=env, env_arguments=env_arguments or ())
-    with EpisodeProgress(Console(stderr=True, highlight=False)) as progress:
+    with EpisodeProgress(common.errors()) as progress:
         result = found.evaluate(
             episodes, greedy=greedy, max_steps=max_steps, seed=seed, watch=progress.on_progress
         )

@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 _GUIDE = "Every word is explained in “How to read the output” (docs/output.md)."
 
 
+def max_steps_option(default: str) -> Any:
+    """Returns the option of how long episodes last at most; `default` says what else ends them."""
+    about = "After which an episode is cut off, if not before."
+    return typer.Option("--max-steps", min=1, help=about, show_default=default)
+
+
 class Ties(StrEnum):
     """Whose future is told where optimal actions tie."""
 
@@ -38,24 +44,19 @@ WhoseTies = Annotated[Ties, typer.Option("--ties", help="Whose future, where opt
 Plot = Annotated[Path | None, typer.Option("--plot", help="Write a picture: .png, .pdf or .svg.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")]
 AGENT = (
-    "A run's folder, RUN@STEP for an older checkpoint, RUN@best for that of the best score; the "
-    "folder of a fit; an exact table: gridworld:NAME, a map file, or tabular:ENV_ID, with "
-    "arguments after commas, such as gridworld:ledge,slip=0.2; or an agent of another library, as "
-    "trdlab agent reads it."
+    "A run's folder, RUN@STEP or RUN@best for another checkpoint of it; the folder of a fit; an "
+    "exact table: gridworld:NAME, a map file, or tabular:ENV_ID, with arguments after commas, such "
+    "as gridworld:ledge,slip=0.2; or an agent of another library, as trdlab agent reads it."
 )
+Env = Annotated[
+    str | None, typer.Option("--env", help="Where it acts.", show_default="where it was made for")
+]
 EnvArguments = Annotated[
     list[str] | None,
     typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
 ]
-MaxSteps = Annotated[
-    int | None,
-    typer.Option(
-        "--max-steps",
-        min=1,
-        help="After which an episode is cut off, if not before.",
-        show_default="1000, or four horizons",
-    ),
-]
+MaxSteps = Annotated[int | None, max_steps_option("1000, or four horizons")]
+EpisodesSeed = Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")]
 Details = Annotated[bool, typer.Option("--details", help="Tell all there is to tell.")]
 
 
@@ -96,6 +97,11 @@ def new_console() -> tuple[Console, bool]:
     """Returns a console on stdout, and whether it can only print ASCII."""
     console = Console(highlight=False)
     return console, not console.encoding.lower().startswith("utf")
+
+
+def errors() -> Console:
+    """Returns a console on stderr, for all that is no answer."""
+    return Console(stderr=True, highlight=False)
 
 
 def print_json(data: object) -> None:
@@ -143,7 +149,7 @@ def save_picture(figure: Any, path: Path) -> None:
     from trdlab.show.plots.style import save
 
     save(figure, path)
-    Console(stderr=True, highlight=False).print(f"Picture: {path}", soft_wrap=True, markup=False)
+    errors().print(f"Picture: {path}", soft_wrap=True, markup=False)
 
 
 def command(words: Sequence[str | float], options: Mapping[str, str | float | None]) -> str:

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from trdlab.cli import common
 
@@ -61,7 +60,7 @@ def compare(
     """
     from trdlab.agents.naming import find_pair
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.explanations.comparison import comparing as two
+    from trdlab.explanations.comparison import comparison as two
 
     agents = find_pair(
         (first, second),
@@ -82,8 +81,7 @@ def compare(
         from trdlab.show.plots.style import check_pictures
 
         check_pictures([out / NAME])
-    errors = Console(stderr=True, highlight=False)
-    with EpisodeProgress(errors, "Getting ready") as progress:
+    with EpisodeProgress(common.errors(), "Getting ready") as progress:
         found = two.compare(
             *agents, episodes=episodes, max_steps=max_steps, seed=seed, watch=progress.on_progress
         )
@@ -102,7 +100,7 @@ def _further(found: "Comparison") -> str:
     """Returns the command that explains the moment at which the two are furthest apart, if any."""
     visits = found.visits
     for m in visits.furthest(1):
-        if words := found.words[visits.player[m]]:
+        if (origin := found.agents[visits.player[m]].origin) is not None:
             where = {"--seed": str(visits.seed[m]), "--step": str(visits.step[m])}
-            return common.command(["explain", *words], where)
+            return common.command(["explain", *origin.words], where)
     return ""

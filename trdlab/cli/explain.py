@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from trdlab.cli import common
 
@@ -40,10 +39,7 @@ def explain(
             show_default="the next best",
         ),
     ] = None,
-    env: Annotated[
-        str | None,
-        typer.Option("--env", help="Where it acts.", show_default="where it was made for"),
-    ] = None,
+    env: common.Env = None,
     env_arguments: common.EnvArguments = None,
     gamma: Annotated[
         float | None,
@@ -104,8 +100,7 @@ def explain(
 
         paths = picture_paths(out, parts, seed=seed, step=step)
         check_pictures(paths.values())
-    errors = Console(stderr=True, highlight=False)
-    with EpisodeProgress(errors, "Getting ready") as progress:
+    with EpisodeProgress(common.errors(), "Getting ready") as progress:
         explained = explain_agent(
             found,
             parts,

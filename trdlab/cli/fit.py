@@ -6,16 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from trdlab.cli import common
 from trdlab.errors import InputError
 
 if TYPE_CHECKING:
-    from trdlab.deep.fit import FitProgress
+    from trdlab.agents.agent import Agent
 
 _UNITS = {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}
-_LINE_SECONDS = 10.0
 
 
 def _seconds(text: str | None) -> float | None:
@@ -30,10 +28,7 @@ def _seconds(text: str | None) -> float | None:
 
 def fit(
     agent: Annotated[str, typer.Argument(metavar="AGENT", help=common.AGENT)],
-    env: Annotated[
-        str | None,
-        typer.Option("--env", help="Where it acts.", show_default="where it was made for"),
-    ] = None,
+    env: common.Env = None,
     env_arguments: common.EnvArguments = None,
     horizon: Annotated[int, typer.Option("--N", help="Number of explicit components.")] = 40,
     width: Annotated[int, typer.Option("--w", help="Steps in each component.")] = 1,
@@ -60,34 +55,82 @@ def fit(
             "--out", metavar="DIR", help="Keep it there.", show_default="a new one in fits"
         ),
     ] = None,
+    outcome: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--outcome",
+            metavar="NAME=info.KEY",
+            help="Forecast that number, too: an event where it is always 0 or 1.",
+        ),
+    ] = None,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--part", metavar="NAME=info.KEY", help="The same, and all parts add up to the reward."
+        ),
+    ] = None,
     verbose: common.Verbose = False,
 ) -> None:
     """Learn what a frozen agent can expect: the decomposition of its own policy.
 
-    The agent plays and stays as it is. A network learns the rewards that really came.
+    The agent plays and stays as it is. A network learns the rewards that really came, how much they
+    vary, and whether the episode was still running.
     """
-    import trdlab
-    from trdlab.explanations.calibration import claims
     from trdlab.files import free_name
 
-    seconds = _seconds(limit)
-    found = trdlab.agent(agent, env=env, env_arguments=_given(env_arguments))
+    limit_seconds, parts, outcomes = _seconds(limit), _places(part), _places(outcome)
+    found = _agent(agent, env, env_arguments)
     out = out or free_name(Path("fits"), f"{found.name}-N{horizon}-w{width}")
-    errors, watch = Console(stderr=True, highlight=False), _Watch(steps)
-    began = time.monotonic()
-    fitted = trdlab.fit(
+    _fit(
         found,
+        out,
         horizon=horizon,
         width=width,
         gamma=gamma,
         steps=steps,
         share=share,
         seed=seed,
-        seconds=seconds,
-        out=out,
+        seconds=limit_seconds,
         method=method,
-        tell=lambda now: watch.tell(errors, now),
+        outcomes=outcomes,
+        parts=parts,
     )
+
+
+def go_on(path: Path) -> None:
+    """Goes on with a fit that was stopped."""
+    from trdlab.runs import RunFolder
+    from trdlab.training.fitted import Plan
+
+    plan = Plan.from_config(RunFolder.open(path).config)
+    if plan.agent is None or plan.has_functions:
+        what = "agent" if plan.agent is None else "outcomes"
+        raise InputError(
+            f"The {what} of '{path}' {'was' if plan.agent is None else 'were'} given in Python.",
+            f"Go on there: trdlab.fit(…, out='{path}') with all that it was begun with.",
+        )
+    found = _agent(plan.agent, plan.env, list(plan.env_arguments), gamma=plan.solved_for)
+    _fit(found, path, **plan.arguments)
+
+
+def _fit(found: "Agent", out: Path, **how: Any) -> None:
+    """Fits, and says how far that can be trusted."""
+    import trdlab
+    from trdlab.cli.progress import stopping
+    from trdlab.explanations.calibration import claims
+    from trdlab.runs import RunFolder
+    from trdlab.training.fitted import Stopped
+
+    errors, began = common.errors(), time.monotonic()
+    with stopping() as stop:
+        try:
+            fitted = trdlab.fit(found, out=out, progress=True, should_stop=stop, **how)
+        except Stopped as stopped:
+            errors.print(f"{stopped.cause} Saved.", soft_wrap=True, markup=False)
+            errors.print(
+                f"Go on: {RunFolder.open(out).resume_command}", soft_wrap=True, markup=False
+            )
+            raise typer.Exit(stop.code or 0) from stopped
     errors.print(f"Kept: {out}", soft_wrap=True, markup=False)
     report = trdlab.calibrate(fitted)
     for claim in claims.in_brief(report):
@@ -95,25 +138,20 @@ def fit(
     common.print_line(f"It took {time.monotonic() - began:.0f} s. Try: trdlab explain {out}", "dim")
 
 
-def _given(env_arguments: list[str] | None) -> dict[str, Any]:
+def _agent(agent: str, env: str | None, env_arguments: list[str] | None, **how: Any) -> "Agent":
+    import trdlab
     from trdlab.environments.arguments import parse_arguments
 
-    return dict(parse_arguments(env_arguments or []))
+    given = dict(parse_arguments(env_arguments or []))
+    return trdlab.agent(agent, env=env, env_arguments=given, **how)
 
 
-class _Watch:
-    """Tells how far it is, now and then."""
-
-    def __init__(self, steps: int) -> None:
-        self._steps, self._shown = steps, time.monotonic()
-
-    def tell(self, console: Console, now: "int | FitProgress") -> None:
-        if time.monotonic() - self._shown < _LINE_SECONDS:
-            return
-        self._shown = time.monotonic()
-        line = (
-            f"{now:,} of {self._steps:,} steps played"
-            if isinstance(now, int)
-            else f"{now.updates:,} updates, held-out error {now.error:.3g} of a constant guess's"
-        )
-        console.print(line, soft_wrap=True, markup=False)
+def _places(given: list[str] | None) -> dict[str, str]:
+    """Returns where numbers stand in `info`, by name, from NAME=info.KEY."""
+    places = {}
+    for text in given or ():
+        name, equals, place = text.partition("=")
+        if not (name and equals and place):
+            raise InputError(f"The outcome is '{text}'.", "Write it as NAME=info.KEY.")
+        places[name] = place
+    return places

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.console import Console
 
 from trdlab.cli import common
 
@@ -31,7 +30,7 @@ def make(
 
     kit_paths(out)  # fails before what takes long
     drawn = draw_trials(seed, trials)
-    errors = Console(stderr=True, highlight=False)
+    errors = common.errors()
     for path in write_kit(out, drawn, seed):
         errors.print(f"Written: {path}", soft_wrap=True, markup=False)
 

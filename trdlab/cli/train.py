@@ -51,10 +51,15 @@ RunPath = Annotated[
         metavar="RUN", help="The run's folder; RUN@STEP or RUN@best for another checkpoint."
     ),
 ]
-Checkpoint = Annotated[
-    int | None,
-    typer.Option("--checkpoint", metavar="STEP", help="An older one.", show_default="the newest"),
-]
+
+
+def _checkpoint(shown: str) -> Any:
+    """Returns the option that names a checkpoint."""
+    return typer.Option("--checkpoint", metavar="STEP", help="Another one.", show_default=shown)
+
+
+Newest = Annotated[int | None, _checkpoint("the newest")]
+OfAgent = Annotated[int | None, _checkpoint("that of the run's agent")]
 
 
 @train.command(name="gym")
@@ -103,7 +108,7 @@ def train_atari(
 
 def resume(
     run: RunPath,
-    checkpoint: Checkpoint = None,
+    checkpoint: Newest = None,
     agent_steps: Annotated[
         int | None,
         typer.Option(
@@ -113,10 +118,15 @@ def resume(
     modules: common.Import = None,
     verbose: common.Verbose = False,
 ) -> None:
-    """Go on with a run that was stopped, exactly as if it had not been; or make it longer."""
+    """Go on with a run or a fit that was stopped, as if it had not been; or make a run longer."""
+    from trdlab.cli.fit import go_on
+    from trdlab.runs.folder import is_fit
     from trdlab.training.run import resume as pick_up
 
     path, step = _named(run, checkpoint)
+    if is_fit(path) and step is agent_steps is None:
+        go_on(path)
+        return
     _carry_on(lambda: pick_up(path, step, agent_steps=agent_steps), longer=agent_steps is not None)
 
 
@@ -136,17 +146,12 @@ def evaluate(
             show_default="as configured",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")] = 1000,
+    seed: common.EpisodesSeed = 1000,
     max_steps: Annotated[
         int | None,
-        typer.Option(
-            "--max-steps",
-            min=1,
-            help="After which an episode is cut off, if not before.",
-            show_default="the environment's limit, or else 1000 or four horizons",
-        ),
+        common.max_steps_option("the environment's limit, or else 1000 or four horizons"),
     ] = None,
-    checkpoint: Checkpoint = None,
+    checkpoint: OfAgent = None,
     modules: common.Import = None,
     as_json: common.AsJson = False,
     verbose: common.Verbose = False,
@@ -242,7 +247,7 @@ def _carry_on(
     )
     from trdlab.training.run import carry_on
 
-    errors = _errors()
+    errors = common.errors()
     with stopping() as stop, open_run() as run:
         path, settings = run.folder.path, run.trainer.settings
         go_on = f"Go on: {run.folder.resume_command}"
@@ -272,7 +277,8 @@ def _carry_on(
             _say(errors, go_on)
             raise typer.Exit(stop.code or 0)
     _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
-    if line := best_line(path, steps, best_step(run.folder)):
+    best, episodes = best_step(run.folder), settings.checkpoint_episodes
+    if line := best_line(path, steps, best, episodes=episodes):
         _say(errors, line)
     if settings.evaluate_episodes:
         _compare_with_chance(run.folder, _evaluate(path), settings)
@@ -295,7 +301,7 @@ def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
     from trdlab.show.training import evaluation_page
     from trdlab.training.loading import evaluate_run
 
-    errors = _errors()
+    errors = common.errors()
     with EpisodeProgress(errors) as progress:
         result, kept = evaluate_run(path, **how, watch=progress.on_progress)
     if as_json:
@@ -314,7 +320,7 @@ def _compare_with_chance(
     from trdlab.show.training import chance_line
     from trdlab.training.loading import evaluate_run
 
-    errors = _errors()
+    errors = common.errors()
     with EpisodeProgress(errors) as progress:
         chance, _ = evaluate_run(folder.path, epsilon=1.0, watch=progress.on_progress)
     more = f"{folder.resume_command} --agent-steps {2 * settings.agent_steps}"
@@ -323,10 +329,6 @@ def _compare_with_chance(
         cure += ", such as --epsilon-hold 10"
     if line := chance_line(result, chance, f"{cure}."):
         _say(errors, line)
-
-
-def _errors() -> Console:
-    return Console(stderr=True, highlight=False)
 
 
 def _say(console: Console, text: str) -> None:

@@ -8,9 +8,10 @@ import torch
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.deep.channels import Channels, outlook_of, reward_of, within
 from trdlab.deep.networks import DecompositionNetwork
 from trdlab.errors import InputError
-from trdlab.estimator import Future
+from trdlab.estimator import Future, Outlook
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +26,9 @@ class NetworkEstimator:
         future: whose future it was trained to tell.
         device: where it computes.
         batch_size: the most observations in one forward pass.
-        possible: `[2, N+1]`, the least and the most that a component can be, if that is known; what
-            the network tells beyond is cut to it.
+        channels: where the network tells several numbers of each action, what they are, C of them.
+        possible: `[2, C, N+1]`, the least and the most that they can be, if that is known; what the
+            network tells beyond is cut to it.
 
     Raises:
         InputError: the network has another number of components, or `batch_size` is below 1.
@@ -37,6 +39,7 @@ class NetworkEstimator:
     future: Future
     device: torch.device | str = "cpu"
     batch_size: int = 256
+    channels: Channels = ()
     possible: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -57,6 +60,22 @@ class NetworkEstimator:
             InputError: the observations have another shape or type than the network takes, or hold
                 what is no number.
         """
+        told = self._told(observations)
+        reward = reward_of(self.channels, told) if self.channels else told
+        return RewardDecomposition(reward, self.time_axis)
+
+    def outlook(self, observations: Any) -> Outlook | None:
+        """Returns what is expected beside the mean of the reward, if the network was taught that.
+
+        Raises:
+            InputError: as for `decompose`.
+        """
+        if not self.channels or not self.time_axis.horizon:
+            return None
+        return outlook_of(self.channels, self._told(observations), self.time_axis)
+
+    def _told(self, observations: Any) -> FloatArray:
+        """Returns all that the network tells: `[B, A, N+1]`, or of channels `[B, A, C, N+1]`."""
         array = np.array(observations)  # [B, ...], a copy that PyTorch may own
         if array.dtype.kind not in "fiub":
             raise InputError(
@@ -82,7 +101,13 @@ class NetworkEstimator:
                 ]
         finally:
             self.network.train(was_training)
-        components = torch.cat(parts).numpy()  # [B, A, N+1]
-        if self.possible is not None:
-            components = np.clip(components, *self.possible.astype(components.dtype))
-        return RewardDecomposition(components, self.time_axis)
+        components: FloatArray = torch.cat(parts).numpy()  # [B, A, N+1], or [B, A·C, N+1]
+        if not self.channels:
+            return components
+        shape = (len(array), -1, len(self.channels), self.time_axis.num_components)
+        components = components.reshape(shape)  # [B, A, C, N+1]
+        return (
+            components
+            if self.possible is None
+            else within(self.channels, components, self.possible)
+        )

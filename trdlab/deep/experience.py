@@ -7,11 +7,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.environments import Environments, NotParallel
 from trdlab.environments.batches import Make
+from trdlab.environments.outcomes import Outcomes
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.policies import Policy
@@ -32,6 +34,7 @@ class Experience:
         probabilities: `[M, A]`, of each action under the policy.
         actions: `[M]`; of no moment in a last row, nor are the rewards.
         rewards: `[M]`, as the future counts them.
+        outcomes: `[M, Q]`, what else is forecast, in numbers.
         ends: `[M]`, whether nothing is left to come after a step.
         until: `[M]`, the number of the row after each at which the policy would act no more, had
             the episode gone on for so long: at which another action is forced, or the time is up.
@@ -44,6 +47,7 @@ class Experience:
     probabilities: FloatArray
     actions: IntArray
     rewards: FloatArray
+    outcomes: FloatArray
     ends: BoolArray
     until: IntArray
     last: IntArray
@@ -57,48 +61,52 @@ class Experience:
         return np.flatnonzero(np.arange(len(self)) < self.last)
 
     @cached_property
-    def _next_end(self) -> IntArray:
+    def next_end(self) -> IntArray:
         """`[M]`: the next step after which nothing is left to come; `FAR` if none is known."""
         return next_flag(self.ends, FAR)
 
-    def ahead(self, rows: IntArray, axis: TimeAxis, most: int | None = None) -> "Ahead":
+    def ahead(
+        self, rows: IntArray, axis: TimeAxis, groups: FloatArray, most: int | None = None
+    ) -> "Ahead":
         """Returns what followed some steps, as far as the policy itself acted after the first.
 
         Args:
             rows: `[K]`, the numbers of the steps.
             axis: γ, N and w.
+            groups: `[M, C]`, what the w steps from each row on brought, in C channels.
             most: after how many components it is not looked any further; by default after N, or
                 after one where N = 0.
         """
         w, reach = axis.width, max(axis.horizon, 1)
         most = reach if most is None else min(most, reach)
-        end, last, until = self._next_end[rows], self.last[rows], self.until[rows]  # [K] each
-        stop = np.minimum(until, last)  # [K], the first step not to be counted
-        over = (end < stop) & (end < rows + most * w)  # [K]
-        span = np.where(over, reach, np.minimum((stop - rows) // w, most))  # [K]
-        steps = np.arange(reach * w)
-        told = np.where(over, end + 1, rows + span * w)[:, None]  # [K, 1]
-        at = rows[:, None] + steps  # [K, L·w]
-        paid = np.where(at < told, self.rewards[np.minimum(at, last[:, None])], 0.0)
-        paid *= axis.gamma**steps
-        rewards = paid.reshape(len(rows), reach, w).sum(axis=2)  # [K, L]
+        end, last, until = self.next_end[rows], self.last[rows], self.until[rows]  # [K] each
+        own = (until - rows) // w  # [K], groups; an end in the part of one counts as little as
+        over = (end < last) & (end < rows + np.minimum(own, most) * w)  # [K], going on would
+        whole = np.minimum((last - rows) // w, most)  # [K]
+        span = np.where(over, reach, np.minimum(own, whole))  # [K]
+        told = np.where(over, end + 1 - rows, span * w)[:, None]  # [K, 1], steps
+        steps = w * np.arange(reach)
+        discounts = np.where(steps < told, axis.gamma**steps, 0.0)  # [K, L]
+        padded = np.concatenate([groups, np.zeros((reach * w, groups.shape[1]), groups.dtype)])
+        windows = sliding_window_view(padded.T, reach * w, axis=1)[..., ::w]  # [C, M+1, L]
+        came = windows[:, rows] * discounts.astype(groups.dtype)  # [C, K, L]
         follows = np.minimum(rows + span * w, last)
-        return Ahead(rewards, span, over, follows, (until - rows) // w)
+        return Ahead(came.swapaxes(0, 1), span, over, follows, own)
 
 
 @dataclass(frozen=True, eq=False)
 class Ahead:
-    """What followed K steps, in L groups of w: N of them, or one where N = 0.
+    """What followed K steps, in C channels and L groups of w: N of them, or one where N = 0.
 
     Args:
-        rewards: `[K, L]`, what came in each, discounted; 0 from `span` on.
+        came: `[K, C, L]`, what came in each, discounted; 0 from `span` on.
         span: `[K]`, of how many that is known.
         over: `[K]`, whether nothing is left to come after that; `span` is L then.
         follows: `[K]`, the row at which all that is not known is still to come.
         own: `[K]`, for how many groups the policy acts, were the episode to go on.
     """
 
-    rewards: FloatArray
+    came: FloatArray
     span: IntArray
     over: BoolArray
     follows: IntArray
@@ -113,29 +121,38 @@ class Ahead:
         own = np.minimum(self.span, self.own)[:, None]
         return np.asarray(np.arange(axis.horizon) < own)
 
-    def target(self, axis: TimeAxis, following: FloatArray) -> FloatArray:
-        """Returns the components `[K, N+1]`: what came, and from there on what is expected.
+    def target(
+        self, axis: TimeAxis, following: FloatArray, which: IntArray | None = None
+    ) -> FloatArray:
+        """Returns the components `[K, C, N+1]`: what came, and from there on what is expected.
 
         It is the law, applied as often as there are components that are known.
 
         Args:
             axis: γ, N and w.
-            following: `[K, N+1]`, what is expected in the rows that follow, of the policy's action.
+            following: `[U, C, N+1]`, what is expected in rows that follow, of the policy's action.
+            which: `[K]`, which of them follows each step; by default there is one for each.
 
         >>> one = np.array([1])
-        >>> ahead = Ahead(np.array([[1.0, 0.0]]), one, np.array([False]), one, one)
-        >>> ahead.target(TimeAxis(0.5, 2), np.array([[2.0, 4.0, 6.0]]))
-        array([[1., 1., 5.]])
+        >>> ahead = Ahead(np.array([[[1.0, 0.0]]]), one, np.array([False]), one, one)
+        >>> ahead.target(TimeAxis(0.5, 2), np.array([[[2.0, 4.0, 6.0]]]))
+        array([[[1., 1., 5.]]])
         """
-        horizon, span = axis.horizon, self.span[:, None]  # [K, 1]
-        discount = np.where(self.over, 0.0, axis.gamma ** (axis.width * self.span))[:, None]
-        place = np.arange(horizon) - span  # [K, N]
-        shifted = np.take_along_axis(following, np.maximum(place, 0), axis=1)
-        explicit = np.where(place < 0, self.rewards[:, :horizon], discount * shifted)
-        later = following[:, ::-1].cumsum(axis=1)[:, ::-1]  # [K, N+1], from each component on
-        rest = np.take_along_axis(later, np.maximum(horizon - span, 0), axis=1)
-        residual = self.rewards[:, horizon:].sum(axis=1, keepdims=True) + discount * rest
-        return np.column_stack([explicit, residual])
+        horizon, which = axis.horizon, np.arange(len(self.span)) if which is None else which
+        left = np.where(self.over, 0.0, axis.gamma ** (axis.width * self.span))
+        discount = left.astype(self.came.dtype)[:, None, None]  # [K, 1, 1]
+        skipped = np.maximum(horizon - self.span, 0)  # [K]
+        later = following[..., ::-1].cumsum(axis=2)[..., ::-1]  # [U, C, N+1], from each one on
+        target = np.empty((*self.came.shape[:2], horizon + 1), dtype=self.came.dtype)
+        target[..., horizon] = discount[..., 0] * later[which, :, skipped]
+        target[..., horizon] += self.came[..., horizon:].sum(axis=2)
+        if horizon:
+            nothing = np.zeros((*following.shape[:2], horizon), dtype=following.dtype)
+            padded = np.concatenate([nothing, following[..., :horizon]], axis=2)  # [U, C, 2N]
+            moved = sliding_window_view(padded, horizon, axis=2)  # [U, C, N+1, N]
+            target[..., :horizon] = self.came[..., :horizon]
+            target[..., :horizon] += discount * moved[which, :, skipped]
+        return target
 
 
 def gather(
@@ -149,6 +166,7 @@ def gather(
     num_envs: int = 16,
     max_steps: int | None = None,
     seed: int = 0,
+    outcomes: Outcomes | None = None,
     tell: Callable[[int], None] = lambda taken: None,
 ) -> Experience:
     """Plays episodes of a policy, with some of its actions forced, so that others are seen, too.
@@ -163,10 +181,12 @@ def gather(
         num_envs: how many episodes are played beside each other.
         max_steps: after which an episode is cut off.
         seed: of everything.
+        outcomes: what else is read of each step.
         tell: told how many steps have been taken, now and then.
 
     Raises:
-        InputError: there is no step, or the share is outside [0, 1].
+        InputError: there is no step, the share is outside [0, 1], or an outcome is no number or
+            was never there.
     """
     if steps < 1 or not 0.0 <= share <= 1.0:
         raise InputError(
@@ -174,13 +194,15 @@ def gather(
             "Ask for at least 1 step, and a share from 0 to 1.",
         )
     rng, taken, batch, parts = np.random.default_rng(seed), 0, 0, list[Experience]()
+    read = outcomes or Outcomes()
     while taken < steps:
         own = int(np.random.SeedSequence([seed, batch]).generate_state(1)[0] >> 1)
         with closing(_some(make, num_envs, own)) as environments:
             playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
-            parts.append(_played(playing, future, share, pause, rng))
+            parts.append(_played(playing, future, share, pause, rng, read))
         taken, batch = taken + len(parts[-1].steps), batch + 1
         tell(taken)
+    read.check_seen()
     starts = np.repeat(np.cumsum([0, *map(len, parts[:-1])]), [len(part) for part in parts])
     names = (of.name for of in fields(Experience))
     columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
@@ -197,7 +219,12 @@ def _some(make: Make, num_envs: int, seed: int) -> Environments:
 
 
 def _played(
-    playing: Playing, future: Future, share: float, pause: int, rng: np.random.Generator
+    playing: Playing,
+    future: Future,
+    share: float,
+    pause: int,
+    rng: np.random.Generator,
+    outcomes: Outcomes,
 ) -> Experience:
     """Plays one episode in each environment to its end."""
     count, num_actions = len(playing.running), playing.environments.num_actions
@@ -212,15 +239,17 @@ def _played(
         actions = np.where(forced, rng.integers(num_actions, size=count), turn.own)
         step = playing.take(actions)
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
-        told = (part[running] for part in (actions, future.count(step.rewards), ends, forced))
-        log.append((np.flatnonzero(running), seen, turn.probabilities, *told))
+        which = np.flatnonzero(running)
+        read = outcomes.read(actions, step, which)  # [R, Q]
+        paid, was = future.count(step.rewards)[running], (ends[running], forced[running])
+        log.append((which, seen, turn.probabilities, actions[running], paid, read, *was))
         if playing.finished.any():
             over = np.flatnonzero(playing.finished)
             wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
             coin[over] = np.maximum(playing.steps, free[over]) + wait
-            nothing = np.zeros(len(over))
-            none = nothing > 0.0
-            log.append((over, *playing.last_seen(), nothing.astype(np.int64), nothing, none, none))
+            none, nothing = np.zeros(len(over), dtype=np.bool_), np.zeros((len(over), 1))
+            done = (none.astype(np.int64), nothing[:, 0], nothing.repeat(read.shape[1], axis=1))
+            log.append((over, *playing.last_seen(), *done, none, none))
     episode, *columns = (np.concatenate(column) for column in zip(*log, strict=True))
     order, lengths = np.argsort(episode, kind="stable"), np.bincount(episode)
     *columns, were_forced = (column[order] for column in columns)

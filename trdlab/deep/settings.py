@@ -181,6 +181,13 @@ class TrainSettings:
     evaluate_epsilon: float = option(
         0.0, "Chance of a random action in it.", "Evaluation", least=0, most=1
     )
+    checkpoint_episodes: int = option(
+        0,
+        "Episodes likewise at each checkpoint, of which the best is the agent; 0: the newest is.",
+        "Evaluation",
+        least=0,
+        most=100_000,
+    )
     checkpoint_every: int = option(
         20_000, "Agent steps between two checkpoints.", "Running", least=1
     )

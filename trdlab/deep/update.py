@@ -143,15 +143,9 @@ class Learner:
         return {
             "settings": asdict(self.settings),
             "num_updates": self.num_updates,
-            "q_network": _arrays(self.q_network.state_dict()),
-            "target_network": _arrays(self.target_network.state_dict()),
-            "optimizer": _arrays(
-                {
-                    f"{name}.{kind}": value
-                    for name, parameter in self.q_network.named_parameters()
-                    for kind, value in self.optimizer.state[parameter].items()
-                }
-            ),
+            "q_network": arrays_of(self.q_network.state_dict()),
+            "target_network": arrays_of(self.target_network.state_dict()),
+            "optimizer": moments_of(self.optimizer, self.q_network),
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
@@ -170,13 +164,7 @@ class Learner:
         self.num_updates = state["num_updates"]
         load_weights(self.q_network, state["q_network"])
         load_weights(self.target_network, state["target_network"])
-        self.optimizer.state.clear()
-        parameters = dict(self.q_network.named_parameters())
-        for key, array in state["optimizer"].items():
-            name, _, kind = key.rpartition(".")
-            like = parameters[name] if np.ndim(array) else torch.zeros((), device=self.device)
-            moment = torch.empty_like(like, requires_grad=False)  # laid out as Adam lays it out
-            self.optimizer.state[parameters[name]][kind] = moment.copy_(torch.as_tensor(array))
+        load_moments(self.optimizer, self.q_network, state["optimizer"])
 
     def _components(self, network: DecompositionNetwork, observations: Tensor) -> Tensor:
         """Returns `[B, A, N+1]`, float32.
@@ -213,7 +201,32 @@ def load_weights(network: DecompositionNetwork, weights: Mapping[str, Any]) -> N
     network.load_state_dict({name: torch.as_tensor(value) for name, value in weights.items()})
 
 
-def _arrays(tensors: Mapping[str, Tensor]) -> dict[str, npt.NDArray[Any]]:
+def moments_of(optimizer: torch.optim.Adam, network: nn.Module) -> dict[str, npt.NDArray[Any]]:
+    """Returns Adam's moments of a network, by the names of its weights."""
+    return arrays_of(
+        {
+            f"{name}.{kind}": value
+            for name, parameter in network.named_parameters()
+            for kind, value in optimizer.state[parameter].items()
+        }
+    )
+
+
+def load_moments(
+    optimizer: torch.optim.Adam, network: nn.Module, moments: Mapping[str, Any]
+) -> None:
+    """Gives Adam the moments that `moments_of` returned."""
+    optimizer.state.clear()
+    parameters = dict(network.named_parameters())
+    for key, array in moments.items():
+        name, _, kind = key.rpartition(".")
+        weights = parameters[name]
+        like = weights if np.ndim(array) else torch.zeros((), device=weights.device)
+        moment = torch.empty_like(like, requires_grad=False)  # laid out as Adam lays it out
+        optimizer.state[weights][kind] = moment.copy_(torch.as_tensor(array))
+
+
+def arrays_of(tensors: Mapping[str, Tensor]) -> dict[str, npt.NDArray[Any]]:
     """Returns copies, each with its numbers in the usual order."""
     return {
         name: np.array(value.detach().cpu().numpy(), order="C") for name, value in tensors.items()

@@ -53,7 +53,7 @@ def beginning_of(env: Any, seed: int, name: str) -> tuple[Any, Any]:
 
 
 def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool, Any]:
-    """Takes an action, and returns observation, reward, terminated, truncated and `info`.
+    """Takes an action, and returns observation, reward, terminated, truncated, info.
 
     Raises:
         InputError: `step` does not return five values, or the reward is no number.

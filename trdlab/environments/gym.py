@@ -83,6 +83,7 @@ class GymEnvironments:
             raise
         self.allowed: BoolArray | None = None
         self.shared_chance, self._is_copy = False, False
+        self._infos: dict[int, Any] = {}
         self._proof: Proof | None = None
 
     @aside()
@@ -241,6 +242,7 @@ class GymEnvironments:
         """Returns the same with copies for environments, whose past is not known."""
         other = copy(self)
         other._envs, other.num_envs, other._is_copy = envs, len(envs), True
+        other._infos = {}
         other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
         other.allowed = None
         return other
@@ -267,6 +269,7 @@ class GymEnvironments:
         observation, step.rewards[env], terminated, truncated, info = outcome_of(
             self._envs[env], self._actions.called[action], self.name
         )
+        self._infos[env] = info
         self._allow(env, info, terminated)
         if step.allowed is not None and self.allowed is not None:
             step.allowed[env] = self.allowed[env]
@@ -326,4 +329,5 @@ class GymEnvironments:
             life_lost=np.zeros(each, dtype=np.bool_),
             following=self._blank_frames(),
             allowed=None if self.allowed is None else np.ones_like(self.allowed),
+            info=lambda env: self._infos.get(env) or {},
         )

@@ -1,6 +1,6 @@
 """What a trainer asks of the environments it acts in."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -28,6 +28,10 @@ class NotParallel(InputError):  # noqa: N818  it says what an environment is, no
     """An environment that cannot be made once more while there is another (see `in_batches`)."""
 
 
+def _no_info(env: int) -> Mapping[str, Any]:
+    return {}
+
+
 @dataclass(frozen=True, eq=False)
 class Step:
     """What one step of B environments led to.
@@ -42,6 +46,8 @@ class Step:
         following: `[B, ...]`, the frame that the next action is chosen at: that of `frames`, or
             the first one of the next episode where one ended.
         allowed: `[B, A]`, which actions could be taken at `frames`; None where all can always be.
+        info: from an environment's number to what else it tells of the step, for as long as no
+            other step has been taken.
     """
 
     frames: Frames
@@ -51,6 +57,7 @@ class Step:
     life_lost: BoolArray
     following: Frames
     allowed: BoolArray | None = None
+    info: Callable[[int], Mapping[str, Any]] = _no_info
 
     @property
     def ended(self) -> BoolArray:

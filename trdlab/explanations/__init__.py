@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from trdlab.explanations.assessment import try_out as try_out
     from trdlab.explanations.calibration.report import CalibrationReport as CalibrationReport
     from trdlab.explanations.calibration.report import judge as judge
-    from trdlab.explanations.comparison.comparing import compare as compare
     from trdlab.explanations.comparison.comparison import Comparison as Comparison
+    from trdlab.explanations.comparison.comparison import compare as compare
     from trdlab.explanations.explanation import Explanation as Explanation
     from trdlab.explanations.explanation import explain as explain
     from trdlab.explanations.moment.exact import gridworld_moment as gridworld_moment

@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trdlab.agents.agent import Agent
-from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition
 from trdlab.environments import NotCopyable, NotParallel
 from trdlab.errors import InputError
-from trdlab.explanations.calibration.calibration import Calibration
 from trdlab.explanations.calibration.report import CalibrationReport, judge, score_of
 from trdlab.explanations.moment.exact import exact_moment
 from trdlab.explanations.moment.moment import Moment
@@ -191,27 +189,6 @@ def moment_of_play(agent: Agent, playing: Playing) -> Moment:
         forbidden=tuple(name for name in agent.action_names if name not in own),
         seconds_per_step=agent.seconds_per_step,
     )
-
-
-def judged(moment: Moment, report: CalibrationReport) -> Moment:
-    """Returns a moment with what a report on its estimator knows of such forecasts.
-
-    That is how far they can be trusted, what they are off by, and whether rewards are of one kind.
-    """
-    reliability = report.calibration.reliability
-    return replace(
-        moment,
-        trust=report.trust,
-        foil_trust=report.foil_trust,
-        error=_root_mean_square(report.calibration),
-        foil_error=None if report.foils is None else _root_mean_square(report.foils),
-        only_reward=None if reliability is None else reliability.amount,
-    )
-
-
-def _root_mean_square(calibration: Calibration) -> FloatArray:
-    error = calibration.error
-    return np.where(np.isfinite(error.low), np.sqrt(error.value), np.nan)
 
 
 def try_out(

@@ -9,7 +9,6 @@ from trdlab.environments import NotCopyable
 from trdlab.errors import InputError, closest
 from trdlab.explanations.assessment import (
     assess,
-    judged,
     moment_of_play,
     trial_of,
     try_in_play,
@@ -178,7 +177,8 @@ def explain(
         report = assess(agent, episodes=count, max_steps=limit, copying=copying, watch=watch)
         missing += [report.lost] * bool(report.lost)
     if choice is not None and report is not None:
-        choice = replace(choice, moment=judged(choice.moment, report))
+        known = replace(choice.moment, calibration=report.calibration, foils=report.foils)
+        choice = replace(choice, moment=known)
     trial = None if tried is None else trial_of(agent, tried, report, seed=seed)
     return Explanation(
         agent, parts, seed, step, choice, report, trial, story, limit, tuple(missing), state

@@ -28,7 +28,8 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
     What happens is drawn from `mdp`, so whatever is learned here can be compared with the exact
     answer. An episode ends where the model terminates; it is never truncated from within (see
     `max_episode_steps` of `gymnasium.make`). `info` has the drone's `row` and `column`, and
-    `collected`, the number of one-time cells it has emptied.
+    `collected`, the number of one-time cells it has emptied; after a step also its `parts`, what
+    each source of reward has paid.
 
     Args:
         map: the name of a built-in map, a map file, or a map.
@@ -49,7 +50,7 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
     >>> state, info = env.reset(seed=0)
     >>> state, reward, terminated, truncated, info = env.step(1)
     >>> int(state), reward, info
-    (2, 0.0, {'row': 2, 'column': 0, 'collected': 0})
+    (2, 0.0, {'row': 2, 'column': 0, 'collected': 0, 'parts': {'coin': 0.0, 'treasure': 0.0}})
     """
 
     metadata = {"render_modes": ["rgb_array", "ansi"], "render_fps": 4}  # noqa: RUF012
@@ -138,7 +139,9 @@ class GridworldEnv(gym.Env[Observation, np.int64]):
         following = int(self.mdp.next_states[drawn])
         self._state, self._terminated = following, bool(self.mdp.terminated[drawn])
         reward = float(self.mdp.rewards[drawn])
-        return self._observe(following), reward, self._terminated, False, self._info(following)
+        parts = {name: float(paid[drawn]) for name, paid in self.world.parts.items()}
+        info = {**self._info(following), "parts": parts}
+        return self._observe(following), reward, self._terminated, False, info
 
     def render(self) -> Any:
         """Returns a picture `[H, W, 3]` or a text, as `render_mode` says.

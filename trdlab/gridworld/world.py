@@ -125,6 +125,20 @@ class Gridworld:
         values = [value if other == source else other.value for other in self.sources]
         return self.mdp.with_rewards(self._earned @ np.array(values))
 
+    @cached_property
+    def parts(self) -> dict[str, FloatArray]:
+        """`[K]` each: what every transition is paid by each source of reward, by its name.
+
+        >>> from trdlab.gridworld.gridmap import load_map
+        >>> list(Gridworld(load_map("ledge")).parts)
+        ['exit', 'hazard', 'step']
+        """
+        names = [source.kind for source in self.sources]
+        return {
+            kind if names.count(kind) == 1 else f"{kind} of {value:g}": value * paid
+            for (kind, value), paid in zip(self.sources, self._earned.T, strict=True)
+        }
+
     def is_terminal(self, state: int) -> bool:
         """Whether the episode is over in a state."""
         return self.grid.cell(*self.states[state].place).terminal

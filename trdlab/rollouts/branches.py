@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
 from trdlab.policies import Policy
 from trdlab.rollouts.playing import Playing, Watch, any_actions, unwatched
-from trdlab.rollouts.realised import Samples
+from trdlab.rollouts.realised import Samples, on_axis
 
 
 class TooFewMoments(InputError):  # noqa: N818  it says what episodes are, not what failed
@@ -181,9 +180,11 @@ class Branching:
         length = self.steps or axis.num_steps
         branch = playing.branch(which, rng=rng, max_steps=length)
         with closing(branch.environments):
-            rewards, ended = _followed(branch, actions, length, future)
-        limit = None if future.time_limit_ends else playing.environments.time_limit
-        observed, known = _on_axis(axis, rewards, ended, limit, playing.steps)
+            rewards, ended, until = _followed(branch, actions, length, future)
+        if not future.time_limit_ends and (limit := playing.environments.time_limit) is not None:
+            until = np.minimum(until, limit - playing.steps)  # as in `what_followed`
+        later = (rewards * axis.gamma ** np.arange(length))[:, axis.num_steps :].sum(axis=1)
+        observed, known = on_axis(axis, rewards[:, : axis.num_steps], later, until, ended)
         of_all = known.reshape(len(moments), self.copies, -1).all(axis=1)  # [M, N+1]
         return Branches(
             time_axis=axis,
@@ -200,18 +201,19 @@ class Branching:
 
 def _followed(
     branch: Playing, actions: IntArray, length: int, future: Future
-) -> tuple[FloatArray, BoolArray]:
-    """Returns the counted rewards `[B, steps]`, NaN from a truncation on, and `[B]`, what ended."""
+) -> tuple[FloatArray, BoolArray, IntArray]:
+    """Returns counted rewards `[B, steps]`, and `[B]` what ended, and until when all is known."""
     rewards, ended = np.zeros((len(actions), length)), np.zeros(len(actions), dtype=np.bool_)
+    until = np.full(len(actions), np.iinfo(np.int64).max)
     while branch.running.any():
         running, t = branch.running, branch.steps
         step = branch.take(branch.turn().actions if t else actions)
         rewards[running, t] = future.count(step.rewards)[running]
         end = running & future.ends(step.terminated, step.truncated, step.life_lost)
         ended |= end
-        rewards[running & step.truncated & ~end, t + 1 :] = np.nan
+        until[running & step.truncated & ~end] = t + 1
         branch.running = branch.running & ~end
-    return rewards, ended
+    return rewards, ended, until
 
 
 def _joined(found: list[Branches]) -> Branches:
@@ -239,23 +241,3 @@ def _others(
         others = allowed & (np.arange(num_actions) != actions[:, None])
         return any_actions(rng, len(actions), num_actions, others)
     return np.asarray((actions + rng.integers(1, num_actions, size=len(actions))) % num_actions)
-
-
-def _on_axis(
-    axis: TimeAxis, rewards: FloatArray, ended: BoolArray, time_limit: int | None, age: int
-) -> tuple[FloatArray, BoolArray]:
-    """Returns `[B, N+1]` twice: the components of `rewards [B, steps]`, and which are known.
-
-    As in `what_followed`, nothing beyond a `time_limit` is known, wherever the episode ended.
-    """
-    count, length = rewards.shape
-    discounted = rewards * axis.gamma ** np.arange(length)
-    explicit = discounted[:, : axis.num_steps].reshape(count, axis.horizon, axis.width)
-    residual = discounted[:, axis.num_steps :].sum(axis=1)
-    observed = np.column_stack([explicit.sum(axis=2), residual])  # [B, N+1]
-    known = ~np.isnan(observed)
-    known[:, -1] &= ended
-    if time_limit is not None:
-        beyond = age + axis.width * np.arange(1, axis.num_components)
-        known[:, :-1] &= beyond <= time_limit
-    return observed, known

@@ -15,8 +15,6 @@ from trdlab.policies import Policy, acting
 from trdlab.rollouts.playing import Playing, Watch, part_of, unwatched
 from trdlab.statistics import Estimate, bootstrap, interquartile_mean
 
-_ENOUGH = 1_000  # steps of an episode that nothing else cuts off
-
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -113,7 +111,9 @@ def score(
     make: Make,
     episodes: int,
     *,
+    epsilon: float = 0.0,
     max_steps: int | None = None,
+    enough: int = 1_000,
     seed: int = 0,
     watch: Watch = unwatched,
 ) -> Evaluation:
@@ -123,8 +123,9 @@ def score(
         who: plays; an estimator by its greedy policy.
         make: makes the environments.
         episodes: how many.
-        max_steps: after which an episode is cut off; by default the environment's own limit, or
-            1,000 where it has none.
+        epsilon: the chance of a random action instead.
+        max_steps: after which an episode is cut off; by default the environment's own limit.
+        enough: the same, where nothing is said and the environment has none.
         seed: of everything.
         watch: told how far the episodes are, after every step.
 
@@ -134,11 +135,11 @@ def score(
     if episodes < 1:
         raise InputError(f"There are {episodes} episodes.", "Ask for at least 1.")
     parts: list[Evaluation] = []
-    for environments in in_batches(make, episodes, seed):
-        limit = max_steps or (None if environments.time_limit else _ENOUGH)
-        told = part_of(watch, sum(len(of.returns) for of in parts), episodes)
-        own = seed + len(parts)  # a single batch, where there can be one
-        parts.append(evaluate(who, environments, max_steps=limit, seed=own, watch=told))
+    for before, environments in enumerate(in_batches(make, episodes, seed)):  # 0 if all at once
+        limit = max_steps or (None if environments.time_limit else enough)
+        told, own = part_of(watch, before, episodes), seed + before
+        part = evaluate(who, environments, epsilon=epsilon, max_steps=limit, seed=own, watch=told)
+        parts.append(part)
     return joined(parts)
 
 

@@ -56,25 +56,37 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
       episodes it is known only if it is of all of their steps, see `pool`.)
     """
     axis, total, far = episode.time_axis, len(episode), np.iinfo(np.int64).max
-    steps, starts = np.arange(axis.num_steps), np.arange(total)
-    end = next_flag(episode.ends, far)  # [T], the step after which nothing comes
+    starts, end = np.arange(total), next_flag(episode.ends, far)  # [T], after which nothing comes
     padded = np.append(episode.rewards, np.zeros(axis.num_steps))
     windows = np.lib.stride_tricks.sliding_window_view(padded, axis.num_steps)[:total]
-    alive = starts[:, None] + steps <= end[:, None]  # [T, N·w]
-    rewards = np.where(alive, windows, 0.0) * axis.gamma**steps
-    explicit = rewards.reshape(total, axis.horizon, axis.width).sum(axis=2)
+    alive = starts[:, None] + np.arange(axis.num_steps) <= end[:, None]  # [T, N·w]
     later = np.append(_returns(episode, axis.gamma), np.zeros(axis.num_steps))[axis.num_steps :]
     residual = np.where(starts + axis.num_steps <= end, later * axis.gamma**axis.num_steps, 0.0)
-    observed = np.column_stack([explicit, residual])
-
-    beyond = starts[:, None] + axis.width * np.arange(1, axis.num_components)  # [T, N], its end
-    known = (end[:, None] < far) | (beyond <= total)
+    until = next_flag(np.append(episode.random, False), far)[1 : total + 1]  # [T]
+    until = np.where(end < far, until, np.minimum(until, total))
     if episode.time_limit is not None:
-        known &= beyond <= episode.time_limit
-    random = np.append(episode.random, False)
-    known &= beyond <= next_flag(random, far)[1 : total + 1, None]
-    known = np.column_stack([known, (end < far) & (episode.epsilon == 0.0)])
-    return np.where(known, observed, 0.0), known
+        until = np.minimum(until, episode.time_limit)
+    whole = (end < far) & (episode.epsilon == 0.0)
+    return on_axis(axis, np.where(alive, windows, 0.0), residual, until - starts, whole)
+
+
+def on_axis(
+    axis: TimeAxis, rewards: FloatArray, residual: FloatArray, until: IntArray, whole: BoolArray
+) -> tuple[FloatArray, BoolArray]:
+    """Returns `[B, N+1]` twice: what came in each component, 0 if not known; and if it is known.
+
+    Args:
+        axis: γ, N and w.
+        rewards: `[B, N·w]`, one for each step.
+        residual: `[B]`, what came later, discounted.
+        until: `[B]`, for how many steps it is known what comes of the policy.
+        whole: `[B]`, whether all that came later is known.
+    """
+    paid = rewards * axis.gamma ** np.arange(axis.num_steps)
+    explicit = paid.reshape(len(rewards), axis.horizon, axis.width).sum(axis=2)
+    reach = axis.width * np.arange(1, axis.num_components)  # [N], where each is over
+    known = np.column_stack([reach <= until[:, None], whole])
+    return np.where(known, np.column_stack([explicit, residual]), 0.0), known
 
 
 def pool(episodes: Sequence[Episode]) -> Samples:

@@ -149,8 +149,8 @@ def find_checkpoint(name: str) -> tuple[Path, int | None]:
     """Returns the folder of a run, and the step of the checkpoint that is named after an `@`.
 
     Args:
-        name: a run's folder, for its newest checkpoint; `RUN@STEP`; or `RUN@best`, for the one of
-            the best score.
+        name: a run's folder, which names none; `RUN@STEP`; or `RUN@best`, for the one of the best
+            score.
 
     Raises:
         InputError: there is no such run, or no such checkpoint of it.

@@ -212,6 +212,17 @@ def is_run(path: Path) -> bool:
     return (path / MANIFEST).exists() or (path / CONFIG).exists()
 
 
+def is_fit(path: Path) -> bool:
+    """Returns whether this is the folder of a fit, and not of a training run."""
+    if not is_run(path):
+        return False
+    try:
+        manifest = read_json(path / MANIFEST)
+    except TrdlabError:
+        return False
+    return isinstance(manifest, dict) and "fit" in manifest
+
+
 def run_paths(parent: Path) -> list[Path]:
     """Returns the folders of runs in a folder, by name."""
     paths = sorted(parent.iterdir()) if parent.is_dir() else []

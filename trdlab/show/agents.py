@@ -58,10 +58,10 @@ def _(report: CalibrationReport) -> Document:
 
 @document.register
 def _(comparison: Comparison) -> Document:
-    axis, seconds = axis_words(comparison.time_axis), _seconds(comparison.seconds_per_step)
+    axis, seconds = axis_words(comparison.time_axis), comparison.agents[0].seconds_per_step
     return Document(
         heading=" · ".join(comparison.titles),
-        setting=(*axis, *_where(comparison), *seconds),
+        setting=(*axis, *_where(comparison), *_seconds(seconds)),
         table=_means(comparison) if comparison.visits.apart.any() else None,
         answer=tuple(claim.sentence for claim in comparing.in_brief(comparison)),
         sections=comparing.sections(comparison),
@@ -88,9 +88,11 @@ def _forbidden(choice: Choice | None) -> list[str]:
 
 def _where(comparison: Comparison) -> list[str]:
     """Returns where both act, if that has a name."""
-    env, *arguments = comparison.place[1::2] or ("",)
-    made = f" with {', '.join(arguments)}" if arguments else ""
-    return [f"both act in {env}{made}"] if env else []
+    origin = comparison.agents[0].origin
+    if origin is None or not origin.env:
+        return []
+    made = f" with {', '.join(origin.env_arguments)}" if origin.env_arguments else ""
+    return [f"both act in {origin.env}{made}"]
 
 
 def _seconds(seconds: float | None) -> list[str]:
@@ -144,22 +146,22 @@ data.register(CalibrationReport, calibration.to_dict)
 
 @data.register
 def _(comparison: Comparison) -> dict[str, Any]:
-    visits = comparison.visits
+    visits, agents = comparison.visits, comparison.agents
     found = ("difference", "apart", "of_any_action", "gap", "shift", "agreement")
     return {
         "schema": "trdlab.compare/2",
         "agents": {
             side: {
-                "name": comparison.names[i],
-                "words": list(comparison.words[i]),
-                "future": comparison.futures[i].to_dict(),
+                "name": agents[i].name,
+                "words": [] if (of := agents[i].origin) is None else list(of.words),
+                "future": agents[i].estimator.future.to_dict(),
                 "mean": plain_data({end: of[i] for end, of in vars(comparison.means).items()}),
                 "calibration": None if report is None else data(report),
             }
             for i, (side, report) in enumerate(zip(SIDES, comparison.reports, strict=True))
         },
-        "place": list(comparison.place),
-        "seconds_per_step": comparison.seconds_per_step,
+        "place": [] if (of := agents[0].origin) is None else list(of.place),
+        "seconds_per_step": agents[0].seconds_per_step,
         "max_steps": comparison.max_steps,
         "time_axis": axis_data(comparison.time_axis),
         "episodes": comparison.episodes,
@@ -174,7 +176,7 @@ def _(comparison: Comparison) -> dict[str, Any]:
 
 def _state(comparison: Comparison, m: int) -> dict[str, Any]:
     """Returns a state, and what each of the two would do there and expects of that."""
-    visits, names = comparison.visits, comparison.action_names
+    visits, names = comparison.visits, comparison.agents[0].action_names
     told = {
         side: {"action": names[visits.actions[i, m]], "components": visits.expected[i, m].tolist()}
         for i, side in enumerate(SIDES)
@@ -192,11 +194,14 @@ def _moment(explanation: Explanation) -> dict[str, Any] | None:
     choice = explanation.choice
     if choice is None:
         return None
-    known = ("error", "foil_error", "only_reward", "forbidden")
+    own, foils = choice.moment.calibration, choice.moment.foils
     return {
         "state": explanation.state,
         "actions": actions_data(choice.moment),
-        **{name: plain_data(getattr(choice.moment, name)) for name in known},
+        "error": None if own is None else plain_data(own.off_by),
+        "foil_error": None if foils is None else plain_data(foils.off_by),
+        "only_reward": choice.moment.only_reward,
+        "forbidden": list(choice.moment.forbidden),
         "action": choice.action,
         "foil": choice.foil,
     }

@@ -151,18 +151,29 @@ def longer_line(settings: TrainSettings, agent_steps: int) -> str:
     )
 
 
-def best_line(path: Path, step: int, best: int | None) -> str:
-    """Returns where an earlier checkpoint had a better score than the last; empty if none had.
+def best_line(path: Path, step: int, best: int | None, *, episodes: int = 0) -> str:
+    """Returns where an earlier checkpoint was better than the last; empty if none was.
+
+    Args:
+        path: of the run.
+        step: of the last checkpoint.
+        best: of the best one; None if no checkpoint has a score.
+        episodes: that were played to score each, so that the best is the run's agent.
 
     >>> best_line(Path("runs/pole"), 100, 80), best_line(Path("runs/pole"), 100, 100)
     ('Its score was better at 80 agent steps: that checkpoint is kept as runs/pole@best.', '')
+    >>> best_line(Path("runs/pole"), 100, 80, episodes=20)
+    'Its agent is that of 80 agent steps, the best in 20 episodes; the last is runs/pole@100.'
     """
     if best is None or best == step:
         return ""
-    return (
-        f"Its score was better at {best:,} agent steps: that checkpoint is kept as "
-        f"{quote(str(path))}@best."
-    )
+    run = quote(str(path))
+    if episodes:
+        return (
+            f"Its agent is that of {best:,} agent steps, the best in {episodes:,} episodes; "
+            f"the last is {run}@{step}."
+        )
+    return f"Its score was better at {best:,} agent steps: that checkpoint is kept as {run}@best."
 
 
 def chance_line(agent: Evaluation, chance: Evaluation, cure: str) -> str:

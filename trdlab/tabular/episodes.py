@@ -25,6 +25,7 @@ class ModelEnvironments:
         starts: `[S]`, how likely episodes begin in each state; without it in `mdp.start`.
         time_limit: the steps after which an episode is truncated.
         action_names: A names; by default their numbers.
+        parts: `[K]` each, what the transitions are paid for by name; steps tell it as `parts`.
 
     Raises:
         InputError: there is no environment, or the starts are no distribution over the states.
@@ -51,10 +52,13 @@ class ModelEnvironments:
         starts: FloatArray | None = None,
         time_limit: int | None = None,
         action_names: tuple[str, ...] = (),
+        parts: Mapping[str, FloatArray] | None = None,
     ) -> None:
         if num_envs < 1:
             raise InputError(f"There are {num_envs} environments.", "Make at least 1.")
-        begin = np.eye(mdp.num_states)[mdp.start] if starts is None else np.asarray(starts)
+        begin = np.zeros(mdp.num_states) if starts is None else np.asarray(starts)
+        if starts is None:
+            begin[mdp.start] = 1.0
         if begin.shape != (mdp.num_states,) or begin.min() < 0.0 or abs(begin.sum() - 1) > 1e-9:
             raise InputError(
                 "The starts are no distribution over the states.",
@@ -66,6 +70,7 @@ class ModelEnvironments:
         self._rng, self._begin = np.random.default_rng(seed), np.cumsum(begin)
         self._cumulative = np.cumsum(mdp.probabilities)  # [K], over all rows
         self._before = np.concatenate([[0.0], self._cumulative])[mdp.offsets]  # [S·A + 1]
+        self._parts = dict(parts or {})
         self._states = np.zeros(num_envs, dtype=np.int64)
         self._elapsed = np.zeros(num_envs, dtype=np.int64)
 
@@ -97,6 +102,8 @@ class ModelEnvironments:
         self._states = frames.copy()
         self._states[ended] = self._first(int(ended.sum()))
         self._elapsed[ended] = 0
+        taken = np.zeros(self.num_envs, dtype=np.int64)
+        taken[acts] = drawn
         return Step(
             frames=frames,
             rewards=rewards,
@@ -104,6 +111,7 @@ class ModelEnvironments:
             truncated=late & ~terminated,
             life_lost=np.zeros(self.num_envs, dtype=np.bool_),
             following=self._states.copy(),
+            info=lambda env: self._told(int(taken[env])),
         )
 
     def branch(self, which: IntArray, seed: int) -> Self:
@@ -126,6 +134,10 @@ class ModelEnvironments:
 
     def close(self) -> None:
         """There is nothing to let go of."""
+
+    def _told(self, transition: int) -> dict[str, Any]:
+        """Returns what a step tells beside its reward."""
+        return {"parts": {name: float(paid[transition]) for name, paid in self._parts.items()}}
 
     def _first(self, count: int) -> IntArray:
         level = self._rng.random(count) * self._begin[-1]

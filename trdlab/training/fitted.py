@@ -1,141 +1,306 @@
-"""A fitted decomposition on disk: its weights, and what they are of."""
+"""A fit in its folder: begun, stopped, gone on with, and read again."""
 
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from trdlab.environments.interface import Interface
+from trdlab.environments.outcomes import INFO
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.estimator import Future
-from trdlab.files import read_json, write_whole
-from trdlab.runs.folder import new_manifest
+from trdlab.runs import MetricsFile, RunFolder, checkpoint_steps, load_checkpoint, save_checkpoint
+from trdlab.runs.folder import is_fit
 from trdlab.time_axis import TimeAxis
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
+    from trdlab.deep.experience import Experience
+    from trdlab.deep.fit import Fit
+    from trdlab.deep.fit_settings import FitProgress, FitSettings
 
-FIT, WEIGHTS = "fit.json", "weights.safetensors"
-SCHEMA = "trdlab.fit/1"
+SAVE_SECONDS = 30.0
+"""So often a fit is saved while it learns."""
+
+
+class Stopped(TrdlabError):  # noqa: N818  nothing has failed
+    """A fit was asked to stop before its end."""
 
 
 @dataclass(frozen=True)
-class Whose:
-    """Whose decomposition it is, as a user names it.
+class Plan:
+    """What is fitted to whom, as it stands in `config.toml`.
 
     Args:
-        agent: a file, a run, a model.
+        agent: as a user names it; None where it was given as an object.
         env: where it acts; None where it was made for.
         env_arguments: what that is made with, as `KEY=VALUE`.
+        solved_for: the γ of the table that the agent acts by; None where it has none.
+        axis: γ, N and w.
+        steps: that it plays, at least.
+        share: of its actions that are forced.
+        outcomes: what else is forecast, and where it stands in `info`, or that it is a function.
+        parts: those of the outcomes that add up to the reward.
+        settings: how it is learned.
     """
 
-    agent: str
-    env: str | None = None
-    env_arguments: tuple[str, ...] = ()
+    agent: str | None
+    env: str | None
+    env_arguments: tuple[str, ...]
+    solved_for: float | None
+    axis: TimeAxis
+    steps: int
+    share: float
+    outcomes: Mapping[str, str]
+    parts: tuple[str, ...]
+    settings: "FitSettings"
+
+    @property
+    def has_functions(self) -> bool:
+        """Whether an outcome was given as a function, which has no name."""
+        return any(not place.startswith(INFO) for place in self.outcomes.values())
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What `trdlab.fit` was called with, beside the agent."""
+        axis, places = self.axis, self.outcomes
+        return {
+            "gamma": axis.gamma,
+            "horizon": axis.horizon,
+            "width": axis.width,
+            "steps": self.steps,
+            "share": self.share,
+            "outcomes": {name: of for name, of in places.items() if name not in self.parts},
+            "parts": {name: places[name] for name in self.parts},
+            **asdict(self.settings),
+        }
+
+    def to_config(self) -> dict[str, Any]:
+        """Returns it as plain values; what is None is left out."""
+        told = {
+            "agent": self.agent,
+            "env": self.env,
+            "env_arguments": list(self.env_arguments),
+            "solved_for": self.solved_for,
+            "gamma": self.axis.gamma,
+            "N": self.axis.horizon,
+            "w": self.axis.width,
+            "steps": self.steps,
+            "share": self.share,
+            "parts": list(self.parts),
+            **asdict(self.settings),
+        }
+        told["hidden"] = told["hidden"] and list(told["hidden"])
+        told |= {"outcomes": dict(self.outcomes)} if self.outcomes else {}
+        return {name: value for name, value in told.items() if value is not None}
+
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> "Plan":
+        """Returns the plan that `to_config` told.
+
+        Raises:
+            LookupError, TypeError: it is none.
+        """
+        from trdlab.deep.fit_settings import FitSettings
+
+        names = {field.name for field in fields(FitSettings)} & set(config)
+        settings = {name: config[name] for name in names}
+        if "hidden" in settings:
+            settings["hidden"] = tuple(settings["hidden"])
+        return cls(
+            agent=config.get("agent"),
+            env=config.get("env"),
+            env_arguments=tuple(config["env_arguments"]),
+            solved_for=config.get("solved_for"),
+            axis=TimeAxis(config["gamma"], config["N"], config["w"]),
+            steps=config["steps"],
+            share=config["share"],
+            outcomes=config.get("outcomes", {}),
+            parts=tuple(config["parts"]),
+            settings=FitSettings(**settings),
+        )
 
 
-def is_fit(path: Path) -> bool:
-    """Returns whether this is the folder of a fit."""
-    return (path / FIT).is_file()
-
-
-def check_free_for_fit(path: Path) -> None:
-    """Checks that a fit can be kept here.
-
-    Raises:
-        OutputError: there is something already.
-    """
-    if path.exists() and not (path.is_dir() and not any(path.iterdir())):
-        raise OutputError(f"'{path}' exists.", "Choose another `out`.")
-
-
-def save_fit(
-    path: Path,
-    estimator: "NetworkEstimator",
-    interface: Interface,
-    whose: Whose | None,
-    how: dict[str, Any],
-) -> None:
-    """Keeps a fitted decomposition in a new folder, all of it or nothing.
+def begin_fit(path: Path, plan: Plan, interface: Interface, future: Future) -> RunFolder:
+    """Makes the folder of a fit, or opens it where the same one was begun and stopped.
 
     Args:
         path: the folder.
-        estimator: what was fitted.
-        interface: what its agent sees and does.
-        whose: the agent, if it has a name by which it can be found again.
-        how: what it was fitted with, as plain data.
+        plan: what is fitted to whom.
+        interface: what the agent sees and does.
+        future: whose future is told.
 
     Raises:
-        OutputError: there is something already, or it cannot be written.
+        OutputError: there is something else already, or it cannot be written.
+        InputError: another fit was begun there.
     """
-    import json
+    if not is_fit(path):
+        extra = {"fit": {"interface": interface.to_dict(), "future": future.to_dict()}}
+        return RunFolder.create(path, plan.to_config(), extra)
+    folder = RunFolder.open(path)
+    if is_done(folder):
+        raise OutputError(f"'{path}' holds a fit that is done.", "Choose another `out`.")
+    now = plan.to_config()
+    changed = [key for key in now | folder.config if now.get(key) != folder.config.get(key)]
+    if changed:
+        key = changed[0]
+        raise InputError(
+            f"The fit in '{path}' was begun with {key} = {folder.config.get(key)!r}, and this has "
+            f"{now.get(key)!r}.",
+            "Go on with the same, or choose another `out`.",
+        )
+    return folder
 
-    from safetensors.torch import save_file
 
-    check_free_for_fit(path)
-    axis, network = estimator.time_axis, estimator.network
-    possible = estimator.possible
-    told = {
-        "schema": SCHEMA,
-        "agent": None if whose is None else vars(whose),
-        "time_axis": {"gamma": axis.gamma, "horizon": axis.horizon, "width": axis.width},
-        "future": estimator.future.to_dict(),
-        "interface": interface.to_dict(),
-        "hidden": [getattr(layer, "out_features", 0) for layer in network.body.children()],
-        "possible": None if possible is None else possible.tolist(),
-        "how": how,
-        "made": new_manifest(),
+def is_done(folder: RunFolder) -> bool:
+    """Returns whether a fit has come to its end."""
+    return bool(checkpoint_steps(folder)) and bool(load_checkpoint(folder).state["done"])
+
+
+def learn(
+    experience: "Callable[[], Experience]",
+    make: "Callable[[Experience], Fit]",
+    future: Future,
+    *,
+    folder: RunFolder | None = None,
+    seconds: float | None = None,
+    tell: "Callable[[FitProgress], None]" = lambda progress: None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> "NetworkEstimator":
+    """Fits until held-out error stops falling; in a folder it goes on where it was stopped.
+
+    Args:
+        experience: plays; it is not asked where that has been done.
+        make: begins to fit what was played.
+        future: whose future is told.
+        folder: where it is kept; None for nowhere.
+        seconds: after which learning stops, if not before.
+        tell: told of each look at the held-out error.
+        should_stop: asked before each.
+
+    Raises:
+        Stopped: it should, and what has been learned is saved if there is a folder.
+        OutputError: the disk is full; what was saved before is whole.
+    """
+    if folder is None:
+        fitting = make(experience())
+        _rounds(fitting, seconds, tell, should_stop, lambda: None)
+        return fitting.estimator(future)
+    with folder.held():
+        fitting = _begun(folder, experience, make, future)
+        with MetricsFile(folder.metrics, fitting.num_updates) as metrics:
+
+            def told(progress: "FitProgress") -> None:
+                metrics.append({"agent_steps": progress.updates, **asdict(progress)})
+                tell(progress)
+
+            _rounds(fitting, seconds, told, should_stop, lambda: _save(folder, fitting, future))
+        _save(folder, fitting, future, done=True)
+    return fitting.estimator(future)
+
+
+def _rounds(
+    fitting: "Fit",
+    seconds: float | None,
+    tell: "Callable[[FitProgress], None]",
+    should_stop: Callable[[], bool],
+    save: Callable[[], None],
+) -> None:
+    began = saved = time.monotonic()
+    while not fitting.done and (seconds is None or time.monotonic() < began + seconds):
+        if should_stop():
+            save()
+            raise Stopped(f"Stopped at {fitting.num_updates:,} updates.")
+        tell(fitting.learn())
+        if time.monotonic() > saved + SAVE_SECONDS:
+            save()
+            saved = time.monotonic()
+
+
+def _begun(
+    folder: RunFolder,
+    experience: "Callable[[], Experience]",
+    make: "Callable[[Experience], Fit]",
+    future: Future,
+) -> "Fit":
+    """Returns a fit as it was saved, or at its beginning, which is saved."""
+    from trdlab.deep.experience import Experience
+
+    if not checkpoint_steps(folder):
+        fitting = make(experience())
+        _save(folder, fitting, future)
+        return fitting
+    checkpoint = load_checkpoint(folder)
+    kinds = checkpoint.state["experience"]
+    columns = {
+        name: np.frombuffer(checkpoint.blocks.get(name, b""), dtype).reshape(shape)
+        for name, (dtype, shape) in kinds.items()
     }
-
-    def write(folder: Path) -> None:
-        folder.mkdir()
-        save_file(network.state_dict(), folder / WEIGHTS)
-        text = json.dumps(told, indent=1, allow_nan=False)
-        (folder / FIT).write_text(text + "\n", encoding="utf-8")
-
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        cause = f"Cannot make '{path}': {error.strerror or error}."
-        raise OutputError(cause, "Choose another `out`.") from error
-    write_whole(path, write)
+    fitting = make(Experience(**columns))
+    fitting.load_state_dict(checkpoint.state["learner"])
+    return fitting
 
 
-def load_fit(path: Path) -> tuple["NetworkEstimator", Interface, Whose | None]:
-    """Returns what was fitted, what its agent sees and does, and who that is, if it has a name.
+def _save(folder: RunFolder, fitting: "Fit", future: Future, *, done: bool = False) -> None:
+    """Saves a fit; what was played is kept until it is done."""
+    from trdlab.deep.update import arrays_of
+
+    estimator = fitting.estimator(future)
+    columns = (
+        {}
+        if done
+        else {
+            field.name: np.ascontiguousarray(getattr(fitting.experience, field.name))
+            for field in fields(fitting.experience)
+        }
+    )
+    state = {
+        "done": done,
+        "q_network": arrays_of(estimator.network.state_dict()),
+        "channels": [asdict(channel) for channel in fitting.channels],
+        "possible": fitting.possible,
+        "hidden": [getattr(layer, "out_features", 0) for layer in fitting.network.body.children()],
+        "experience": {name: [of.dtype.str, list(of.shape)] for name, of in columns.items()},
+        "learner": {} if done else fitting.state_dict(),
+    }
+    blocks = {name: of.data.cast("B") for name, of in columns.items() if of.size}
+    save_checkpoint(folder, fitting.num_updates, state, blocks, keep=1)
+
+
+def load_fit(path: Path) -> "tuple[NetworkEstimator, Interface, Plan]":
+    """Returns what was fitted, the best of it so far, what its agent sees and does, and the plan.
 
     Raises:
-        TrdlabError: something is torn.
+        TrdlabError: something is torn, or nothing has been learned yet.
     """
-    import numpy as np
-
+    from trdlab.deep.channels import Channel
     from trdlab.deep.estimator import NetworkEstimator
     from trdlab.deep.networks import build_network
     from trdlab.deep.update import load_weights
-    from trdlab.policies.weights import read_weights
 
-    told = read_json(path / FIT)
-    if isinstance(told, dict) and told.get("schema", SCHEMA) != SCHEMA:
+    folder = RunFolder.open(path)
+    if not checkpoint_steps(folder):
         raise TrdlabError(
-            f"'{path / FIT}' has the schema '{told['schema']}', and this version reads '{SCHEMA}'.",
-            "Fit the agent again, or use the version that wrote it.",
+            f"Nothing has been learned yet in '{path}'.", f"Go on: {folder.resume_command}."
         )
+    state = load_checkpoint(folder).state
     try:
-        axis, whose = TimeAxis(**told["time_axis"]), told["agent"]
-        interface, hidden = (
-            Interface.from_dict(told["interface"]),
-            tuple(size for size in told["hidden"] if size),
-        )
+        plan, told = Plan.from_config(folder.config), folder.manifest["fit"]
+        interface = Interface.from_dict(told["interface"])
         future = Future.from_dict(told["future"])
-        possible = None if told["possible"] is None else np.array(told["possible"])
-        named = whose and Whose(whose["agent"], whose["env"], tuple(whose["env_arguments"]))
-    except (LookupError, TypeError, ValueError) as error:
+        channels = tuple(Channel(**channel) for channel in state["channels"])
+        hidden = tuple(size for size in state["hidden"] if size)
+        rows = len(interface.action_names) * len(channels)
+        network = build_network(interface.space, rows, plan.axis, seed=0, hidden=hidden)
+        load_weights(network, state["q_network"])
+    except (LookupError, TypeError, ValueError, InputError) as error:
         raise TrdlabError(
-            f"'{path / FIT}' does not say what was fitted: it is torn.", "Fit the agent again."
+            f"'{path}' does not say what was fitted: it is torn.", "Fit the agent again."
         ) from error
-    count = len(interface.action_names)
-    network = build_network(interface.space, count, axis, seed=0, hidden=hidden)
-    try:
-        load_weights(network, read_weights(path / WEIGHTS))
-    except InputError as error:
-        raise TrdlabError(f"'{path}' is torn: {error.cause}", "Fit the agent again.") from error
-    return NetworkEstimator(network, axis, future, possible=possible), interface, named or None
+    estimator = NetworkEstimator(
+        network, plan.axis, future, channels=channels, possible=state["possible"]
+    )
+    return estimator, interface, plan

@@ -4,17 +4,18 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trdlab.decomposition import TimeAxis
 from trdlab.deep.settings import TrainSettings
-from trdlab.environments import Environments, in_batches
+from trdlab.environments import Environments
 from trdlab.environments.interface import Interface
 from trdlab.environments.making import check_imported
 from trdlab.errors import InputError, OutputError, TrdlabError
+from trdlab.estimator import Estimator
 from trdlab.files import check_own, write_json
-from trdlab.rollouts.evaluation import Evaluation, evaluate, joined
-from trdlab.rollouts.playing import Watch, part_of, unwatched, usual_limit
-from trdlab.runs import RunFolder, read_arrays
-from trdlab.training.fitted import is_fit, load_fit
+from trdlab.rollouts.evaluation import Evaluation, score
+from trdlab.rollouts.playing import Watch, unwatched, usual_limit
+from trdlab.runs import RunFolder, best_step, read_arrays
+from trdlab.runs.folder import is_fit
+from trdlab.training.fitted import load_fit
 from trdlab.training.machine import use_threads
 from trdlab.training.setup import future, make_environments
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 EVALUATION_SEED = 1000
 """Not that of a run, so that an agent is evaluated from starts that it was not trained from."""
+CHECKPOINT_SEED = 2000
+"""Nor that of an evaluation, so that no agent is chosen for what it then is evaluated by."""
 
 
 def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
@@ -33,7 +36,8 @@ def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
 
     Args:
         path: the run's folder, or that of a fit.
-        step: of an older checkpoint, in agent steps; by default the newest.
+        step: of a checkpoint, in agent steps; by default that of the run's agent: the newest one,
+            or the best where checkpoints are evaluated.
 
     Raises:
         InputError: there is no run, or no such checkpoint.
@@ -45,7 +49,7 @@ def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
 
 
 def _loaded(folder: RunFolder, step: int | None) -> tuple[int, "NetworkEstimator"]:
-    """Returns the step of a checkpoint, the newest one unless it is given, and its agent."""
+    """Returns the step of a checkpoint, that of the run's agent unless given, and its agent."""
     from trdlab.deep.estimator import NetworkEstimator
     from trdlab.deep.networks import build_network
     from trdlab.deep.update import load_weights
@@ -54,9 +58,18 @@ def _loaded(folder: RunFolder, step: int | None) -> tuple[int, "NetworkEstimator
     known, hidden = interface_of(folder), settings.hidden
     actions = len(known.action_names)
     network = build_network(known.space, actions, settings.time_axis, hidden=hidden)
-    step, weights = read_arrays(folder, "q_network", step)
+    step, weights = read_arrays(folder, "q_network", agent_step(folder) if step is None else step)
     load_weights(network, weights)
     return step, NetworkEstimator(network, settings.time_axis, future(settings))
+
+
+def agent_step(folder: RunFolder) -> int | None:
+    """Returns the step of the checkpoint that is the run's agent; None for the newest.
+
+    Raises:
+        InputError: its settings are none, or out of their range.
+    """
+    return best_step(folder) if run_settings(folder).checkpoint_episodes else None
 
 
 def run_settings(folder: RunFolder) -> TrainSettings:
@@ -100,7 +113,7 @@ def evaluate_run(
         episodes: how many; by default as the run's configuration says.
         epsilon: the chance of a random action; likewise.
         seed: of the environments and the random actions.
-        step: of an older checkpoint, in agent steps; by default the newest.
+        step: of a checkpoint, in agent steps; by default that of the run's agent.
         max_steps: after which an episode is cut off, if not before; by default the environment's
             own limit, or where it has none what `usual_limit` says.
         watch: told how far the episodes are.
@@ -123,32 +136,60 @@ def evaluate_run(
         raise InputError(f"`epsilon` is {chance}.", "It lies from 0 to 1.")
     step, estimator = _loaded(folder, step)
     count = episodes or settings.evaluate_episodes or 30
-    parts: list[Evaluation] = []
+    how = count, chance, seed, max_steps
+    return _evaluated(folder, settings, step, estimator, *how, watch)
+
+
+def evaluate_checkpoint(
+    folder: RunFolder, settings: TrainSettings, step: int, estimator: Estimator
+) -> Evaluation:
+    """Evaluates the agent of a checkpoint that is about to be saved, as its run's settings say.
+
+    Args:
+        folder: the run's; the result is kept in it if it can be written.
+        settings: the run's.
+        step: of the checkpoint, in agent steps.
+        estimator: its agent.
+
+    Raises:
+        InputError: the environments cannot be made.
+        EnvironmentFault: they fail.
+    """
+    how = settings.checkpoint_episodes, settings.evaluate_epsilon, CHECKPOINT_SEED
+    return _evaluated(folder, settings, step, estimator, *how)[0]
+
+
+def _evaluated(
+    folder: RunFolder,
+    settings: TrainSettings,
+    step: int,
+    estimator: Estimator,
+    count: int,
+    chance: float,
+    seed: int,
+    max_steps: int | None = None,
+    watch: Watch = unwatched,
+) -> tuple[Evaluation, Path | OutputError]:
+    """Plays episodes with the agent of a checkpoint, and keeps the result if it can be written."""
 
     def make(num_envs: int, seed: int) -> Environments:
-        return make_environments(settings, num_envs=num_envs, seed=seed)
-
-    for environments in in_batches(make, count, seed):
+        environments = make_environments(settings, num_envs=num_envs, seed=seed)
         interface_of(folder).check_fits(Interface.of(environments), settings.env)
-        parts.append(
-            evaluate(
-                estimator,
-                environments,
-                epsilon=chance,
-                seed=seed + len(parts),  # a single batch, where there can be one
-                max_steps=_limit(environments, max_steps, settings.time_axis),
-                watch=part_of(watch, sum(len(of.returns) for of in parts), count),
-            )
-        )
-    result = joined(parts)
+        return environments
+
+    result = score(
+        estimator,
+        make,
+        count,
+        epsilon=chance,
+        max_steps=max_steps,
+        enough=usual_limit(settings.time_axis),
+        seed=seed,
+        watch=watch,
+    )
     limit = f"-max-steps-{max_steps}" if max_steps else ""
     name = f"step-{step}-episodes-{count}-epsilon-{chance:g}-seed-{seed}{limit}.json"
     return result, _keep(folder.evaluations / name, {"agent_steps": step, **result.to_dict()})
-
-
-def _limit(environments: Environments, given: int | None, axis: TimeAxis) -> int | None:
-    """Returns the steps after which to cut an episode off; None where the environment does."""
-    return given if given or environments.time_limit else usual_limit(axis)
 
 
 def _keep(path: Path, data: dict[str, Any]) -> Path | OutputError:

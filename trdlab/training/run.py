@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from trdlab.deep.board import board, check_board
+from trdlab.deep.estimator import NetworkEstimator
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer, TrainMetrics
 from trdlab.environments.interface import Interface
@@ -23,9 +24,9 @@ from trdlab.runs import (
     save_checkpoint,
 )
 from trdlab.runs.folder import check_free, is_run
-from trdlab.training.loading import interface_of, run_settings
+from trdlab.training.loading import evaluate_checkpoint, interface_of, run_settings
 from trdlab.training.machine import check_threads, memory_of, resolved
-from trdlab.training.setup import default_path, describe, make_environments, new_trainer
+from trdlab.training.setup import default_path, describe, future, make_environments, new_trainer
 
 
 @dataclass(eq=False)
@@ -48,19 +49,38 @@ class Run:
     seconds: float = 0.0
     problem: TrdlabError | None = None
 
-    def save(self) -> None:
-        """Saves a checkpoint.
+    def save(self, *, stopped: bool = False) -> None:
+        """Saves a checkpoint, with the score by which the best is found.
+
+        Args:
+            stopped: whether it is there only because the run was stopped. No episodes are played to
+                score it: the agent of a run does not depend on where it was interrupted.
 
         Raises:
             OutputError: the disk is full; earlier checkpoints stay.
+            EnvironmentFault: an environment in which it is evaluated fails; likewise.
         """
+        score = self._score(stopped=stopped)
         state = self.trainer.state_dict()
         state["q_network"] = state["learner"].pop("q_network")  # so that it can be read alone
         blocks = state["memory"]["frames"].pop("sealed")
         state["run"] = {"seconds": self.seconds}
         self.metrics.sync()
-        step, score = self.trainer.agent_steps, self.trainer.scores.mean_return
-        save_checkpoint(self.folder, step, state, blocks, score=score)
+        save_checkpoint(self.folder, self.trainer.agent_steps, state, blocks, score=score)
+
+    def _score(self, *, stopped: bool) -> float | None:
+        """Returns the mean return of episodes played for it, or else of those of training."""
+        settings, begun = self.trainer.settings, time.perf_counter()
+        if not settings.checkpoint_episodes:
+            return self.trainer.scores.mean_return
+        if stopped:
+            return None
+        learner, step = self.trainer.learner, self.trainer.agent_steps
+        told, device = future(settings), learner.device
+        agent = NetworkEstimator(learner.q_network, settings.time_axis, told, device)
+        result = evaluate_checkpoint(self.folder, settings, step, agent)
+        self.seconds += time.perf_counter() - begun
+        return float(result.returns.mean())
 
 
 @contextmanager
@@ -165,7 +185,7 @@ def carry_on(
                 saved, since = trainer.agent_steps, time.perf_counter()
             on_step(trainer)
     if saved != trainer.agent_steps:
-        run.save()
+        run.save(stopped=not trainer.done)
     return trainer.done
 
 

@@ -81,7 +81,7 @@ def default_path(settings: TrainSettings) -> Path:
 
 
 def make_environments(
-    settings: TrainSettings, *, num_envs: int | None = None, seed: int | None = None
+    settings: TrainSettings, num_envs: int | None = None, seed: int | None = None
 ) -> Environments:
     """Makes the environments of a run, or of its evaluation.
 

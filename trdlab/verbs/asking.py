@@ -131,7 +131,7 @@ def compare(
         InputError: one is no agent, or the two cannot be compared.
     """
     from trdlab.agents.naming import find_pair
-    from trdlab.explanations.comparison import comparing
+    from trdlab.explanations.comparison import comparison
     from trdlab.rollouts.playing import unwatched
 
     names = (first, second)
@@ -139,6 +139,6 @@ def compare(
         pair = find_pair((str(first), str(second)), env=env, **how)
     else:
         pair = find(first, env, **how), find(second, env, **how)
-    return comparing.compare(
+    return comparison.compare(
         *pair, episodes=episodes, seed=seed, max_steps=max_steps, watch=watch or unwatched
     )

@@ -1,6 +1,7 @@
 """Making agents: solve a model, train a network, name an agent or fit one."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +14,9 @@ OWN = "the agent's own policy"
 if TYPE_CHECKING:
     from trdlab.agents.agent import Agent
     from trdlab.agents.places import Where
-    from trdlab.deep.fit import FitProgress
     from trdlab.deep.settings import Kind
     from trdlab.deep.trainer import TrainMetrics
+    from trdlab.environments.outcomes import Outcome
     from trdlab.policies import Who
 
 
@@ -112,8 +113,9 @@ def solve(what: Any, gamma: float = 0.95, horizon: int = 4, width: int = 1) -> "
     """
     import gymnasium as gym
 
-    from trdlab.agents.exact import gridworld_agent, model_agent, tabular_agent
+    from trdlab.agents.given import model_agent
     from trdlab.agents.models import TABULAR, is_model, model_of
+    from trdlab.agents.naming import gridworld_agent, tabular_agent
     from trdlab.gridworld import map_names
     from trdlab.tabular import from_environment
     from trdlab.tabular.toytext import toy_text_ids
@@ -163,7 +165,7 @@ def train(
         InputError: there is no such environment, preset or setting, or a value cannot be used.
         OutputError: the folder exists, or cannot be written.
     """
-    from trdlab.agents.runs import run_agent
+    from trdlab.agents.naming import find_agent
     from trdlab.training.run import begin, carry_on
     from trdlab.training.setup import read_settings
 
@@ -179,7 +181,7 @@ def train(
     with begin(chosen, None if out is None else Path(out)) as run:
         carry_on(run, on_metrics=on_metrics)
         path = run.folder.path
-    return run_agent(path)
+    return find_agent(str(path))
 
 
 def fit(
@@ -192,15 +194,19 @@ def fit(
     steps: int = 100_000,
     share: float = 0.1,
     seed: int = 1,
+    outcomes: "Mapping[str, Outcome | str] | None" = None,
+    parts: "Mapping[str, Outcome | str] | None" = None,
     seconds: float | None = None,
     out: str | Path | None = None,
-    tell: "Callable[[int | FitProgress], None]" = lambda progress: None,
+    progress: bool = False,
+    should_stop: Callable[[], bool] = lambda: False,
     **settings: Any,
 ) -> "Agent":
     """Learns what a frozen policy can expect, and returns the same agent that knows it.
 
     The policy plays, with some of its actions forced, so that those it would not take are covered,
-    too. Then a network learns the reward that really came at each step. The policy stays as it is.
+    too. Then a network learns the reward that really came at each step, how much that varies, and
+    whether the episode was still running. The policy stays as it is.
 
     Args:
         agent: whatever `trdlab.agent` takes.
@@ -211,56 +217,94 @@ def fit(
         steps: how many it plays, at least.
         share: the chance that an action is forced.
         seed: of everything.
+        outcomes: what else to forecast, by name: a function of a step (see `Transition`), or where
+            a number stands in `info`, such as `"info.fuel"`. What is always 0 or 1 is an event.
+        parts: likewise, what adds up to the reward.
         seconds: after which learning stops, if not before; then the seed is not all it depends on.
-        out: a new folder to keep it in, which names the agent from then on.
-        tell: told of steps that were taken, and then of each look at the held-out error.
+        out: a folder to keep it in, which names the agent from then on. Where the same fit was
+            begun and stopped, it goes on.
+        progress: whether to show on stderr how far it is.
+        should_stop: asked now and then; if it says so, what was learned is saved.
         settings: else, as of `FitSettings`: `method`, `hidden`, `learning_rate`, …
 
     Raises:
-        InputError: this is no agent, or a setting cannot be used.
+        InputError: this is no agent, a setting cannot be used, the parts do not add up, or another
+            fit was begun in `out`.
         OutputError: the folder exists, or cannot be written.
+        Stopped: it should stop.
     """
-    from dataclasses import asdict
-
-    from trdlab.deep.experience import gather
-    from trdlab.deep.fit import Fit, FitSettings
-    from trdlab.estimator import Future, Unfitted
+    from trdlab.deep.experience import Experience, gather
+    from trdlab.deep.fit import Fit
+    from trdlab.deep.fit_settings import FitSettings
+    from trdlab.environments.outcomes import Outcomes
+    from trdlab.estimator import Future
     from trdlab.policies import acting
     from trdlab.rollouts.playing import usual_limit
     from trdlab.time_axis import TimeAxis
-    from trdlab.training.fitted import Whose, check_free_for_fit, save_fit
+    from trdlab.training import fitted
+    from trdlab.verbs.watching import FitWatch
 
-    if out is not None:
-        check_free_for_fit(Path(out))
     frozen, chosen = _agent(agent, env), FitSettings(**{"seed": seed} | settings)
     policy = acting(frozen.policy or frozen.estimator)
     own = getattr(policy, "gamma", None)
     if own is None:
-        own = 0.99 if isinstance(frozen.estimator, Unfitted) else frozen.estimator.time_axis.gamma
+        own = frozen.estimator.time_axis.gamma if frozen.is_fitted else 0.99
     axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)
-    experience = gather(
-        frozen.make,
-        policy,
-        future,
-        steps=steps,
-        share=share,
-        pause=axis.num_steps if chosen.method == "regression" else 0,
-        num_envs=16 if frozen.world is None else 1_000,  # of a model they are cheap
-        max_steps=usual_limit(axis),
-        seed=seed,
-        tell=tell,
-    )
-    fitting = Fit(experience, frozen.interface.space, axis, chosen)
-    fitting.run(tell, seconds)
-    fitted = replace(frozen, estimator=fitting.estimator(future), policy=policy)
+    read, made_of = Outcomes(dict(parts or {}) | dict(outcomes or {})), tuple(parts or ())
+    folder, of = None, frozen.origin
     if out is not None:
-        of = frozen.origin
-        at = (of.env, of.env_arguments) if of and of.away else ()
-        whose = None if of is None else Whose(of.name, *at)
-        how = {"steps": steps, "share": share, "updates": fitting.num_updates, **asdict(chosen)}
-        save_fit(Path(out), fitting.estimator(future), frozen.interface, whose, how)
-        fitted = replace(fitted, name=Path(out).name)
-    return fitted
+        plan = fitted.Plan(
+            agent=None if of is None else of.name,
+            env=of.env if of is not None and of.away else None,
+            env_arguments=of.env_arguments if of is not None and of.away else (),
+            solved_for=of.time_axis.gamma if of is not None and of.time_axis else None,
+            axis=axis,
+            steps=steps,
+            share=share,
+            outcomes=read.places,
+            parts=made_of,
+            settings=chosen,
+        )
+        folder = fitted.begin_fit(Path(out), plan, frozen.interface, future)
+    watch = FitWatch(steps)
+
+    def taken(count: int) -> None:
+        if should_stop():
+            raise fitted.Stopped(f"Stopped after {count:,} steps, before anything was learned.")
+        if progress:
+            watch.tell(count)
+
+    def played() -> Experience:
+        return gather(
+            frozen.make,
+            policy,
+            future,
+            steps=steps,
+            share=share,
+            pause=axis.num_steps if chosen.method == "regression" else 0,
+            num_envs=16 if frozen.world is None else 1_000,  # of a model they are cheap
+            max_steps=usual_limit(axis),
+            seed=seed,
+            outcomes=read,
+            tell=taken,
+        )
+
+    def begun(experience: Experience) -> Fit:
+        space = frozen.interface.space
+        return Fit(experience, space, axis, chosen, names=read.names, parts=made_of)
+
+    with watch if progress else nullcontext():
+        estimator = fitted.learn(
+            played,
+            begun,
+            future,
+            folder=folder,
+            seconds=seconds,
+            tell=watch.tell if progress else lambda now: None,
+            should_stop=should_stop,
+        )
+    called = frozen.name if out is None else Path(out).name
+    return replace(frozen, name=called, estimator=estimator, policy=policy)
 
 
 _agent = agent  # which a parameter is called, too

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations import moment_at
 from trdlab.explanations.comparison.claims import nothing_differs, one_tells, sections, trusted
-from trdlab.explanations.comparison.comparing import compare
-from trdlab.explanations.comparison.comparison import Comparison, centre, compared
+from trdlab.explanations.comparison.comparison import Comparison, centre, compare, compared
 from trdlab.explanations.comparison.states import Visits, visit
 from trdlab.policies import Memoryless
 from trdlab.rollouts.playing import Progress
@@ -64,15 +64,18 @@ def between(
         step=np.zeros(count, dtype=np.int64),
         different=different,
     )
-    return compared(
-        visits,
-        names=("one", "other"),
-        words=((), ()),
-        place=(),
-        action_names=("wait",),
-        futures=(Future("the policy"), Future("the policy")),
-        episodes=count,
+    one, other = (
+        SimpleNamespace(
+            name=name,
+            estimator=SimpleNamespace(future=Future("the policy")),
+            action_names=("wait",),
+            seconds_per_step=None,
+            origin=None,
+        )
+        for name in ("one", "other")
     )
+    agents: Any = one, other
+    return compared(agents, visits, episodes=count, max_steps=1_000)
 
 
 def test_an_agent_against_itself_is_the_same_everywhere():
@@ -243,15 +246,13 @@ def test_it_is_told_whose_forecasts_can_be_trusted():
 def test_different_futures_are_each_between():
     one = np.ones((12, 2))
     comparison = between(one, 2 * one, TimeAxis(0.9, 1))
-    clipped = replace(
-        comparison, futures=(Future("the policy"), Future("another", clip_rewards=True))
-    )
-    assert [claim.sentence for claim in one_tells(clipped)] == [
+    comparison.agents[1].estimator.future = Future("another", clip_rewards=True)
+    assert [claim.sentence for claim in one_tells(comparison)] == [
         "A tells of the future of the policy: reward as the environment pays it, up to the end of "
         "the episode.",
         "B tells of the future of another: sign of each reward, up to the end of the episode.",
     ]
-    assert nothing_differs(clipped) == []
+    assert nothing_differs(comparison) == []
 
 
 def test_a_pair_shares_what_is_said_of_exact_tables():

@@ -4,6 +4,8 @@ import json
 import re
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,14 +14,14 @@ from hypothesis import strategies as st
 
 import mutants
 from trdlab.agents import Agent, find_pair, gridworld_agent
+from trdlab.agents.places import Origin
 from trdlab.cli import main
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations import assess
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison.claims import in_brief, sections
-from trdlab.explanations.comparison.comparing import compare
-from trdlab.explanations.comparison.comparison import COMPARISONS, Comparison, compared
+from trdlab.explanations.comparison.comparison import COMPARISONS, Comparison, compare, compared
 from trdlab.explanations.comparison.states import Visits
 from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check
 from trdlab.policies import Memoryless
@@ -120,17 +122,23 @@ def comparisons(draw: st.DrawFn) -> Comparison:
     )
     one, other = draw(st.permutations(range(6)))[:2]
     futures = Future("the optimal policy"), Future("the greedy policy", clip_rewards=True)
+    seconds = draw(st.sampled_from([None, 0.25]))
+    agents: Any = tuple(
+        SimpleNamespace(
+            name=name,
+            estimator=SimpleNamespace(future=future),
+            action_names=NAMES[:actions],
+            seconds_per_step=seconds,
+            origin=Origin(name, "World-v0", ("slip=0.2",), None),
+        )
+        for name, future in (("one", futures[0]), ("other", draw(st.sampled_from(futures))))
+    )
     return compared(
+        agents,
         visits,
-        names=("one", "other"),
-        words=(("one",), ("other",)),
-        place=("--env", "World-v0", "--env-arg", "slip=0.2"),
-        action_names=NAMES[:actions],
-        futures=(futures[0], draw(st.sampled_from(futures))),
-        reports=(reports()[one], reports()[other]),
+        (reports()[one], reports()[other]),
         episodes=draw(st.sampled_from([1, 12])),
         max_steps=draw(st.sampled_from([1, 1_000])),
-        seconds_per_step=draw(st.sampled_from([None, 0.25])),
     )
 
 
@@ -223,10 +231,11 @@ def test_a_sentence_that_is_none_of_ours_or_not_true_is_named():
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(comparisons(), st.integers(-12, 12))
 def test_scaled_agents_are_told_of_in_the_same_sentences(comparison: Comparison, power: int):
-    scale, names = 10.0**power, ("names", "words", "place", "action_names", "futures", "episodes")
+    scale, known = 10.0**power, {"episodes": comparison.episodes, "max_steps": 1_000}
     visits = replace(comparison.visits, components=comparison.visits.components * scale)
-    known = {name: getattr(comparison, name) for name in names}
-    small, large = (told(compared(of, **known)) for of in (comparison.visits, visits))
+    small, large = (
+        told(compared(comparison.agents, of, **known)) for of in (comparison.visits, visits)
+    )
     assert [claim.kind for claim in small] == [claim.kind for claim in large]
     for one, other in zip(small, large, strict=True):
         for field, value in one.fields.items():

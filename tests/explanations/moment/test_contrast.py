@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from moments import GAMMA, choice, moment, of_kind, said, told, trusted
+from moments import GAMMA, calibrated, choice, moment, of_kind, said, told, trusted
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
@@ -292,18 +292,18 @@ def test_next_to_nothing_is_no_lead():
 def test_a_difference_that_cannot_be_trusted_is_not_discussed():
     rows = [[0.0, 1.0, 0.0, 3.0], [0.5, 0.0, 0.0, 0.0]]  # |differences| 0.5, 1, 0, 3
     axis = TimeAxis(GAMMA, 3)
-    of = moment(rows, trust=trusted(axis, 3)).choice("a", "b")
+    of = moment(rows, calibration=trusted(axis, 3)).choice("a", "b")
     (doubt,) = of_kind(of, "untested-difference")
     assert doubt.share == pytest.approx(3.0 / 4.5)
     assert doubt.sentence == (
         "67 % of the difference between a and b comes after the first 3 steps, and that is not to "
         "be trusted."
     )
-    silent = replace(trusted(axis, 3), status=("good", "good", "good", "not tested"))
-    (untested,) = of_kind(moment(rows, trust=silent).choice("a", "b"), "untested-difference")
+    silent = calibrated(axis, ("good", "good", "good", "not tested"))
+    (untested,) = of_kind(moment(rows, calibration=silent).choice("a", "b"), "untested-difference")
     assert untested.sentence.endswith("and that was not tested.")
     assert not of_kind(of, "reasons")
-    sure = moment(rows, trust=trusted(axis, 3, residual=True)).choice("a", "b")
+    sure = moment(rows, calibration=trusted(axis, 3, residual=True)).choice("a", "b")
     assert of_kind(sure, "reasons")
     assert not of_kind(sure, "untested-difference")
 

@@ -1,6 +1,5 @@
 """What is forecast of one action, in numbers worked out by hand and in words."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -114,8 +113,8 @@ def test_the_first_cost_is_the_first_step_that_can_cost_something():
 
 
 def judged(row: list[float], good: int, residual: bool, **known: Any) -> Choice:
-    trust = trusted(TimeAxis(GAMMA, len(row) - 1), good, residual)
-    return one(row, trust=trust, **known)
+    axis = TimeAxis(GAMMA, len(row) - 1)
+    return one(row, calibration=trusted(axis, good, residual, **known))
 
 
 def test_nothing_is_forecast_that_cannot_be_trusted():
@@ -150,17 +149,17 @@ def test_an_expected_reward_is_a_chance_only_where_one_reward_or_none_comes(amou
 
 def test_no_chance_is_read_from_a_group():
     axis = TimeAxis(GAMMA, 2, 3)
-    grouped = moment([[0.0, 0.8, 0.0]], width=3, only_reward=1.0)
-    of = replace(grouped, trust=trusted(axis, 2, residual=True)).choice("a")
+    known = trusted(axis, 2, residual=True, only_reward=1.0)
+    of = moment([[0.0, 0.8, 0.0]], width=3, calibration=known).choice("a")
     assert not of_kind(of, "put-at")
 
 
 def test_an_error_is_told_where_it_is_as_large_as_half_of_what_is_expected():
     row = [0.0, 0.8, 0.0, 0.0]
-    large = judged(row, 3, True, error=np.array([0.1, 0.4, 0.1, 0.1]))
+    large = judged(row, 3, True, off_by=[0.1, 0.4, 0.1, 0.1])
     assert said(large, "off-by") == ["Forecasts of what comes 1 step later are off by about 0.4."]
     for error in ([0.5, 0.39, 0.5, 0.5], [np.nan] * 4):
-        assert not of_kind(judged(row, 3, True, error=np.array(error)), "off-by")
+        assert not of_kind(judged(row, 3, True, off_by=error), "off-by")
 
 
 def test_the_centre_is_told_in_steps_where_no_rhythm_is():

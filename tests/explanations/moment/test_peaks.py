@@ -1,10 +1,12 @@
 """Peaks and rhythm of vectors whose bumps are known, and of maps that pay again and again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import peak_prominences
 
-from moments import trusted
+from moments import calibrated, trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
 from trdlab.explanations.moment.exact import gridworld_moment
@@ -25,12 +27,15 @@ def noise(seed: int, size: float = 0.03) -> np.ndarray:
     return np.random.default_rng(seed).normal(0.0, size, len(STEPS))
 
 
-def learned(row: np.ndarray, width: int = 1, good: int | None = None, **known: object) -> Moment:
+def learned(
+    row: np.ndarray, width: int = 1, good: int | None = None, off_by: np.ndarray | None = None
+) -> Moment:
     """A moment of one action that expects `row`, before the discount."""
     axis = TimeAxis(0.95, len(row) - 1, width)
-    trust = None if good is None else trusted(axis, good)
+    judged = None if good is None else trusted(axis, good)
+    judged = judged if off_by is None else calibrated(axis, off_by=off_by)
     components = RewardDecomposition((row * axis.discounts)[None], axis)
-    return Moment(components, ("go",), Future("the greedy policy"), trust=trust, **known)  # type: ignore[arg-type]
+    return Moment(components, ("go",), Future("the greedy policy"), calibration=judged)
 
 
 def told(moment: Moment) -> dict[str, str]:
@@ -54,7 +59,7 @@ def test_a_rhythm_is_found_under_noise_on_a_slope_and_of_costs(seed, sign, slope
 
 
 def test_a_period_is_told_from_its_shortest_to_its_longest():
-    said = told(learned(bumps(3, 11, 19, 27, 35), seconds_per_step=1 / 15))
+    said = told(replace(learned(bumps(3, 11, 19, 27, 35)), seconds_per_step=1 / 15))
     assert (
         "every 8 steps, the first time 3 steps later (0.2 s), the last time 35 steps later"
         in said["rhythm"]
@@ -74,7 +79,7 @@ def test_three_peaks_are_a_rhythm_only_of_what_is_more_than_noise():
     row = bumps(3, 11, 19)
     off = np.full(41, 0.5) * TimeAxis(0.95, 40).discounts
     assert "rhythm" not in told(learned(row))
-    assert "every 8 steps" in told(learned(row, error=off))["rhythm"]
+    assert "every 8 steps" in told(learned(row, off_by=off))["rhythm"]
 
 
 def test_of_many_peaks_the_most_prominent_are_named():
@@ -131,8 +136,8 @@ def test_what_forecasts_are_off_by_is_no_peak():
     row = bumps(8) + 0.4 * bumps(20)
     assert peaks(learned(row), "go") == [8, 20]
     off = np.full(41, 0.5) * TimeAxis(0.95, 40).discounts
-    assert peaks(learned(row, error=off), "go") == [8]
-    assert peaks(learned(row, error=3 * off), "go") == []
+    assert peaks(learned(row, off_by=off), "go") == [8]
+    assert peaks(learned(row, off_by=3 * off), "go") == []
 
 
 def test_prominences_are_those_of_scipy():

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 import mutants
 from definitions import holds
-from moments import told, trusted
+from moments import calibrated, told, trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
-from trdlab.explanations.calibration.calibration import Trust
+from trdlab.explanations.calibration.calibration import Calibration
 from trdlab.explanations.moment.exact import gridworld_moment, tabular_moment
 from trdlab.explanations.moment.moment import CHOICES, Choice, Moment, Uncertainty, WhatIf
 from trdlab.explanations.moment.telling import in_brief
@@ -112,11 +112,12 @@ def moments(draw: st.DrawFn) -> Moment:
         return decomposition.value + slope * (value - 0.95) * np.arange(actions)
 
     components = draw(st.integers(0, horizon))
-    trust = trusted(axis, components, draw(st.booleans()))
-    untested = tuple(draw(st.sampled_from(["good", "open", "not tested"])) for _ in rows[0])
-    foil_trust = Trust(axis, untested)
     off_by = [0.01, 0.2, 0.3, 0.5, 0.7, 2.0, 4.0, 9.0, np.nan, np.nan]
-    errors = draw(st.permutations(off_by))[: horizon + 1]
+    errors = size * np.array(draw(st.permutations(off_by))[: horizon + 1])
+    amount = draw(st.sampled_from([None, 4.0 * size, -4.0 * size]))
+    own = trusted(axis, components, draw(st.booleans()), off_by=errors, only_reward=amount)
+    untested = tuple(draw(st.sampled_from(["good", "open", "not tested"])) for _ in rows[0])
+    foils = calibrated(axis, untested, 2.0 * errors)
     return Moment(
         decomposition,
         NAMES[:actions],
@@ -126,12 +127,9 @@ def moments(draw: st.DrawFn) -> Moment:
         tied=draw(st.sampled_from([(), NAMES[:2]])),
         tied_later=draw(st.integers(0, 2)),
         what_ifs=(WhatIf("γ", 0.95, 0.01, 0.99, q_values),),
-        trust=draw(st.sampled_from([None, trust])),
-        error=draw(st.sampled_from([None, size * np.array(errors)])),
         policy=draw(st.sampled_from([None, np.eye(actions)[0]])),
-        foil_trust=draw(st.sampled_from([None, foil_trust])),
-        foil_error=draw(st.sampled_from([None, 2.0 * size * np.array(errors)])),
-        only_reward=draw(st.sampled_from([None, 4.0 * size, -4.0 * size])),
+        calibration=draw(st.sampled_from([None, own])),
+        foils=draw(st.sampled_from([None, foils])),
     )
 
 
@@ -164,18 +162,18 @@ def of_learned() -> list[Choice]:
             bumps = sum(np.exp(-((steps - place) ** 2) / 4.0) for place in places)
             row = size * bumps + slope * (1.0 - steps / 40) + rng.normal(0.0, 0.02, 41)
             rows = np.stack([row, np.roll(row, 2)]) * axis.discounts
-            trust = trusted(axis, 36)
+            off_by = rng.uniform(0.2, 0.5, 41) * axis.discounts
+            far, near = (
+                trusted(axis, good, off_by=off_by, only_reward=2.2 * size) for good in (36, 1)
+            )
             of = Moment(
                 RewardDecomposition(rows, axis),
                 NAMES[:2],
                 Future("the greedy policy"),
-                trust=trust,
-                error=rng.uniform(0.2, 0.5, 41) * axis.discounts,
-                only_reward=2.2 * size,
+                calibration=far,
                 seconds_per_step=0.1,
             )
-            near = replace(of, trust=trusted(axis, 1))
-            result += [of.choice(*NAMES[:2]), near.choice(*NAMES[:2])]
+            result += [of.choice(*NAMES[:2]), replace(of, calibration=near).choice(*NAMES[:2])]
     return result
 
 
@@ -254,14 +252,19 @@ def test_a_scaled_model_says_the_same_with_scaled_numbers(moment: Moment, power:
         spread = (known.deviation * scale, known.return_deviation * scale)
         return Uncertainty(*spread, known.survival, outcomes)
 
+    def judged(of: Calibration | None) -> Calibration | None:
+        if of is None:
+            return None
+        amount = None if of.only_reward is None else of.only_reward * scale
+        return calibrated(of.time_axis, of.status, of.off_by * scale, amount)
+
     times = {
         "decomposition": RewardDecomposition(
             moment.decomposition.components * scale, moment.time_axis
         ),
         "totals": None if moment.totals is None else moment.totals * scale,
-        "error": None if moment.error is None else moment.error * scale,
-        "foil_error": None if moment.foil_error is None else moment.foil_error * scale,
-        "only_reward": None if moment.only_reward is None else moment.only_reward * scale,
+        "calibration": judged(moment.calibration),
+        "foils": judged(moment.foils),
         "uncertainty": scaled(moment.uncertainty),
         "what_ifs": (),
     }

@@ -177,7 +177,7 @@ def furthest_apart(comparison: Comparison) -> Iterator[Fields]:
     for m in visits.furthest(FURTHEST):
         actions = visits.actions[:, m]
         worth = visits.components[(0, 1), m, actions].sum(axis=-1)
-        names = [comparison.action_names[a] for a in actions]
+        names = [comparison.agents[0].action_names[a] for a in actions]
         yield {
             "distance": float(visits.apart[m]),
             "step": int(visits.step[m]),
@@ -211,7 +211,7 @@ def compared_at(comparison: Comparison) -> Iterator[Fields]:
 def some_cut_off(comparison: Comparison) -> Iterator[Fields]:
     """Episodes that would have gone on, but were not played for longer."""
     if comparison.visits.cut:
-        yield {"episodes": comparison.visits.cut, "steps": comparison.max_steps or 0}
+        yield {"episodes": comparison.visits.cut, "steps": comparison.max_steps}
 
 
 @COMPARISONS.rule("Only {different:episodes} {are:text} distinct: too few to tell about others.")
@@ -226,7 +226,7 @@ def all_alike(comparison: Comparison) -> Iterator[Fields]:
     "{ending:text}."
 )
 def each_tells(comparison: Comparison) -> Iterator[Fields]:
-    one, other = comparison.futures
+    one, other = (agent.estimator.future for agent in comparison.agents)
     if one == other:
         yield {"policy": one.policy, "reward": one.reward, "ending": one.ending}
 
@@ -236,8 +236,9 @@ def each_tells(comparison: Comparison) -> Iterator[Fields]:
 )
 def one_tells(comparison: Comparison) -> Iterator[Fields]:
     """What each tells of, where these are different kinds of future."""
-    if comparison.futures[0] != comparison.futures[1]:
-        for side, of in zip(SIDES, comparison.futures, strict=True):
+    futures = [agent.estimator.future for agent in comparison.agents]
+    if futures[0] != futures[1]:
+        for side, of in zip(SIDES, futures, strict=True):
             yield {"side": side, "policy": of.policy, "reward": of.reward, "ending": of.ending}
 
 

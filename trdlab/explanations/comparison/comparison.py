@@ -1,18 +1,21 @@
-"""The comparison of two agents: how far they are apart over many states, with intervals."""
+"""Two agents compared: how far they are apart over many states, with intervals."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from trdlab.agents.agent import Agent
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
-from trdlab.estimator import Future
+from trdlab.errors import InputError
+from trdlab.explanations.assessment import assess, usual_episodes
 from trdlab.explanations.calibration.report import CalibrationReport
-from trdlab.explanations.comparison.states import Visits
+from trdlab.explanations.comparison.states import Visits, visit
 from trdlab.explanations.rules import Language
 from trdlab.explanations.words import forms_of
 from trdlab.printable import Printable
+from trdlab.rollouts.playing import Progress, Watch, unwatched, usual_limit
 from trdlab.statistics import FEWEST_EPISODES, Estimate, Estimates, draws, percentiles, pooled
 
 SIDES = ("A", "B")
@@ -27,12 +30,10 @@ class Comparison(Printable):
     one agent and that of the other, can be much alike. They are NaN where too few episodes differ.
 
     Args:
-        names: of the two.
-        words: what names each on the command line, where both act.
-        place: the options that name where that is.
-        action_names: A names.
-        futures: whose future each speaks of.
+        agents: the two, where the first one acts.
+        reports: how far the forecasts of each can be trusted; None where that was not judged.
         episodes: how many each of them played.
+        max_steps: after which an episode was cut off, if not before.
         visits: what both expect at every state.
         means: `[2, N+1]`, what each expects of what it would do.
         difference: `[N+1]`, the second's mean minus the first's.
@@ -41,17 +42,12 @@ class Comparison(Printable):
         gap: the difference over all components.
         shift: by how many steps later the second expects its rewards (see `centre`).
         agreement: the share of the states at which both would take the same action.
-        reports: how far the forecasts of each can be trusted; None where that was not judged.
-        max_steps: after which an episode was cut off, if not before; None for never.
-        seconds_per_step: how long a step takes as people play, if that is known.
     """
 
-    names: tuple[str, str]
-    words: tuple[tuple[str, ...], tuple[str, ...]]
-    place: tuple[str, ...]
-    action_names: tuple[str, ...]
-    futures: tuple[Future, Future]
+    agents: tuple[Agent, Agent]
+    reports: Sequence[CalibrationReport | None]
     episodes: int
+    max_steps: int
     visits: Visits
     means: Estimates
     difference: Estimates
@@ -60,9 +56,6 @@ class Comparison(Printable):
     gap: Estimate
     shift: Estimate
     agreement: Estimate
-    reports: tuple[CalibrationReport | None, CalibrationReport | None] = (None, None)
-    max_steps: int | None = None
-    seconds_per_step: float | None = None
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -72,19 +65,88 @@ class Comparison(Printable):
     @property
     def titles(self) -> tuple[str, ...]:
         """Who A and who B is; in full where their names do not tell."""
-        names = self.names
-        if names[0] == names[1] and all(self.words):
-            names = self.words[0][0], self.words[1][0]
+        names = [agent.name for agent in self.agents]
+        origins = [agent.origin for agent in self.agents if agent.origin is not None]
+        if names[0] == names[1] and len(origins) == 2:
+            names = [origin.name for origin in origins]
         return tuple(f"{side}: {name}" for side, name in zip(SIDES, names, strict=True))
 
 
 COMPARISONS = Language[Comparison](
-    "this comparison", lambda of: forms_of(of.time_axis, of.seconds_per_step)
+    "this comparison", lambda of: forms_of(of.time_axis, of.agents[0].seconds_per_step)
 )
 
 
-def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
-    """Returns how far apart two estimators are at some states; `told` are its other fields."""
+def compare(
+    first: Agent,
+    second: Agent,
+    *,
+    episodes: int | None = None,
+    judged_by: int | None = None,
+    seed: int = 0,
+    max_steps: int | None = None,
+    most_states: int = 1_000,
+    watch: Watch = unwatched,
+) -> Comparison:
+    """Compares two agents at states of episodes of both, played where the first one acts.
+
+    Args:
+        first: called A.
+        second: called B; it acts where the first one does.
+        episodes: how many each plays, with the seeds from `seed` on; by default 20, or 50 if both
+            are exact tables.
+        judged_by: how many more each plays to judge its forecasts by, 0 for none; by default as
+            many, or where nothing is said 50, and 300 of an exact table.
+        seed: of the first episode, and of everything else.
+        max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
+            says.
+        most_states: how many states are kept at most, half of them of the episodes of each.
+        watch: told how far the episodes are, after every step.
+
+    Raises:
+        InputError: the two do not see or do the same, discount otherwise, or there is no episode.
+    """
+    tables = first.world is not None and second.world is not None
+    count = (50 if tables else 20) if episodes is None else episodes
+    if count < 1:
+        raise InputError(f"There are {count} episodes.", "Ask for at least 1.")
+    first.estimator.time_axis.shared(second.estimator.time_axis)  # refuses other discounts
+    if differs := first.interface.unlike(second.interface):
+        raise InputError(
+            f"{first.name} and {second.name} cannot be compared: they have {differs[0]} and "
+            f"{differs[1]}.",
+            "Compare agents that see and do the same.",
+        )
+    there = replace(second, make=first.make, origin=None)
+    if first.origin and second.origin:
+        there = replace(there, origin=second.origin.at(first.origin))
+    players = (first, there)
+    longest = max(usual_limit(agent.estimator.time_axis) for agent in players)
+    limit = longest if max_steps is None else max_steps
+    visits = visit(
+        players, episodes=count, seed=seed, most_states=most_states, max_steps=limit, watch=watch
+    )
+    reports: list[CalibrationReport | None] = []
+    for side, agent in zip(SIDES, players, strict=True):
+
+        def tell(progress: Progress, side: str = side) -> None:
+            watch(replace(progress, what=f"{progress.what} {side}"))
+
+        more = judged_by if judged_by is not None else episodes or usual_episodes(agent)
+        reports.append(assess(agent, episodes=more, max_steps=limit, watch=tell) if more else None)
+    return compared(players, visits, reports, episodes=count, max_steps=limit, seed=seed)
+
+
+def compared(
+    agents: tuple[Agent, Agent],
+    visits: Visits,
+    reports: Sequence[CalibrationReport | None] = (None, None),
+    *,
+    episodes: int,
+    max_steps: int,
+    seed: int = 0,
+) -> Comparison:
+    """Returns how far apart two agents are at some states; for the rest see `Comparison`."""
     size, actions = visits.time_axis.num_components, visits.actions
     rows = np.concatenate(
         [
@@ -118,6 +180,10 @@ def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
         Estimates(*(end[part] for end in ends)) for part in (slice(2), 2, 3, 4)
     )
     return Comparison(
+        agents=agents,
+        reports=reports,
+        episodes=episodes,
+        max_steps=max_steps,
         visits=visits,
         means=means,
         difference=difference,
@@ -126,7 +192,6 @@ def compared(visits: Visits, *, seed: int = 0, **told: Any) -> Comparison:
         agreement=found[5 * size],
         gap=found[5 * size + 1],
         shift=found[5 * size + 2],
-        **told,
     )
 
 

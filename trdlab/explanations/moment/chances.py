@@ -29,8 +29,7 @@ def put_at(choice: Choice) -> Iterator[Fields]:
     """
     moment, paid = choice.moment, choice.moment.only_reward
     row = undiscounted(moment, choice.action)
-    is_judged = moment.trust is not None and not moment.is_exact
-    if paid is None or not is_judged or choice.time_axis.width != 1 or not row.any():
+    if paid is None or moment.is_exact or choice.time_axis.width != 1 or not row.any():
         return
     i = largest(moment, choice.action)
     chance = float(row[i] / paid)

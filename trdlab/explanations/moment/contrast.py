@@ -161,9 +161,8 @@ def untested_difference(choice: Choice) -> Iterator[Fields]:
         share = float(size[doubt].sum() / size.sum()) if size.any() else 0.0
         if share > _MOST_DOUBT:
             components = tuple(np.flatnonzero(doubt & (size > 0.0)).tolist())
-            states = {
-                choice.moment.status_of(name)[i] for name in (action, foil) for i in components
-            }
+            known = (choice.moment.judged(name) for name in (action, foil))
+            states = {of.status[i] for of in known if of is not None for i in components}
             state = "was not tested" if states <= {"good", "not tested"} else "is not to be trusted"
             about = {"share": share, "action": action, "foil": foil, "state": state}
             yield about | {"components": components}

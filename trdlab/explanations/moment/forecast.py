@@ -145,13 +145,14 @@ def firsts(choice: Choice) -> Iterator[Found]:
 @CHOICES.rule("Forecasts of what comes {component:when} are off by about {error:number}.")
 def off_by(choice: Choice) -> Iterator[Fields]:
     """The root mean square of what forecasts of the largest component are off by, if it matters."""
-    errors, row = choice.moment.error_of(choice.action), _row(choice)
+    judged = choice.moment.judged(choice.action)
     nothing = not undiscounted(choice.moment, choice.action).any()
-    if nothing or errors is None or choice.moment.is_exact:
+    if nothing or judged is None or choice.moment.is_exact:
         return
     i = largest(choice.moment, choice.action)
-    if errors[i] >= _MATTERS * abs(row[i]):  # not so if it is NaN
-        yield {"action": choice.action, "component": i, "error": float(errors[i])}
+    error = float(judged.off_by[i])
+    if error >= _MATTERS * abs(_row(choice)[i]):  # not so if it is NaN
+        yield {"action": choice.action, "component": i, "error": error}
 
 
 @CHOICES.rule("{share:percent} of what {action} {pays:text} comes {component:when}.")

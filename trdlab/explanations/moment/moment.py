@@ -15,7 +15,7 @@ from trdlab.explanations.rules import Language
 from trdlab.explanations.words import forms_of
 
 if TYPE_CHECKING:
-    from trdlab.explanations.calibration.calibration import Status, Trust
+    from trdlab.explanations.calibration.calibration import Calibration
 
 
 class WhatIf(NamedTuple):
@@ -81,13 +81,8 @@ class Moment:
         tied_later: the number of later states where that is so.
         what_ifs: the quantities that can be varied, where there is a model to solve again.
         uncertainty: spread and survival, where they are known.
-        trust: how far such forecasts can be trusted, if that has been judged.
-        foil_trust: the same of first actions that the policy does not take.
-        error: `[N+1]`, what such forecasts are off by, in discounted reward: the root mean square
-            of predicted − observed, NaN where it is not known; None if it has not been judged.
-        foil_error: the same of first actions that the policy does not take.
-        only_reward: the one reward that was ever observed besides 0; None where there were several,
-            and where that is not known.
+        calibration: how good such forecasts are, if that has been judged.
+        foils: the same of first actions that the policy does not take.
         seconds_per_step: how long a step takes as people play, if that is known.
         forbidden: the names of actions that cannot be taken here; they are none of the A.
     """
@@ -103,11 +98,8 @@ class Moment:
     tied_later: int = 0
     what_ifs: tuple[WhatIf, ...] = ()
     uncertainty: Uncertainty | None = None
-    trust: "Trust | None" = None
-    foil_trust: "Trust | None" = None
-    error: FloatArray | None = None
-    foil_error: FloatArray | None = None
-    only_reward: float | None = None
+    calibration: "Calibration | None" = None
+    foils: "Calibration | None" = None
     seconds_per_step: float | None = None
     forbidden: tuple[str, ...] = ()
 
@@ -155,23 +147,15 @@ class Moment:
         """Returns the Q-value of one action."""
         return float(self.q_values[self.index(action)])
 
-    def trust_of(self, action: str) -> "Trust | None":
-        """Returns how far forecasts of such an action can be trusted, if that has been judged."""
-        return self.foil_trust if self._is_judged_foil(action) else self.trust
+    @property
+    def only_reward(self) -> float | None:
+        """The one reward that was ever observed besides 0; None if there are more, or unknown."""
+        return None if self.calibration is None else self.calibration.only_reward
 
-    def status_of(self, action: str) -> "tuple[Status, ...]":
-        """Returns N+1 of good, bad, open or not tested; all not tested where nothing is judged."""
-        trust = self.trust_of(action)
-        nothing: Status = "not tested"
-        return (nothing,) * self.time_axis.num_components if trust is None else trust.status
-
-    def error_of(self, action: str) -> FloatArray | None:
-        """`[N+1]`: what forecasts of such an action are off by, if that has been judged."""
-        return self.foil_error if self._is_judged_foil(action) else self.error
-
-    def _is_judged_foil(self, action: str) -> bool:
-        chance = 1.0 if self.policy is None else self.policy[self.index(action)]
-        return bool(chance == 0.0) and self.foil_trust is not None
+    def judged(self, action: str) -> "Calibration | None":
+        """Returns how good forecasts of such an action are, if that has been judged."""
+        is_taken = self.policy is None or self.policy[self.index(action)] > 0.0
+        return self.calibration if is_taken or self.foils is None else self.foils
 
     def total(self, action: str) -> float:
         """Returns the undiscounted total of one action, NaN where none exists or is known."""

@@ -90,7 +90,7 @@ def rhythm(choice: Choice) -> Iterator[Fields]:
     """
     moment, action = choice.moment, choice.action
     found = peaks(moment, action)
-    is_judged = moment.is_exact or moment.error_of(action) is not None
+    is_judged = moment.is_exact or moment.judged(action) is not None
     if len(found) < (3 if is_judged else 4):
         return
     spacings = np.diff(found)
@@ -160,10 +160,10 @@ def peaks(moment: Moment, action: str) -> list[int]:
 
 def _doubt(moment: Moment, action: str) -> FloatArray:
     """Returns `[K]`: what such forecasts are off by, in the unit of `shares`; 0 if not known."""
-    row, errors = undiscounted(moment, action), moment.error_of(action)
-    if errors is None or moment.is_exact or not row.any():
+    row, judged = undiscounted(moment, action), moment.judged(action)
+    if judged is None or moment.is_exact or not row.any():
         return np.zeros(len(row))
-    error = np.nan_to_num(errors[: len(row)]) / moment.time_axis.discounts[: len(row)]
+    error = np.nan_to_num(judged.off_by[: len(row)]) / moment.time_axis.discounts[: len(row)]
     return np.asarray(error / np.abs(row).max())
 
 

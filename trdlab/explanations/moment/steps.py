@@ -16,10 +16,10 @@ def doubtful(moment: Moment, action: str) -> BoolArray:
 
     That is nothing where it has not been judged, nor of an exact table, which needs no tests.
     """
-    trust = moment.trust_of(action)
-    if trust is None or moment.is_exact:
+    judged = moment.judged(action)
+    if judged is None or moment.is_exact:
         return np.zeros(moment.time_axis.num_components, dtype=np.bool_)
-    return trust.doubtful
+    return judged.trust.doubtful
 
 
 def explicit_end(moment: Moment, action: str) -> int:

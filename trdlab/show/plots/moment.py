@@ -197,7 +197,8 @@ def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:
 
 def _doubts(moment: Moment, *actions: str) -> list[Status | None]:
     """Returns N+1: the worst of what was found of actions; None where there is no doubt."""
-    judged = [moment.status_of(name) for name in actions if moment.trust_of(name) is not None]
+    found = map(moment.judged, actions)
+    judged = [of.status for of in found if of is not None]
     order: tuple[Status, ...] = ("bad", "not tested", "open")
     columns = zip(*judged, strict=True) if judged else [()] * moment.time_axis.num_components
     return [next((doubt for doubt in order if doubt in found), None) for found in columns]
@@ -207,8 +208,8 @@ def _lengths(moment: Moment, action: str) -> FloatArray:
     """Returns `[N+1]`: how long whiskers are, 0 or NaN where there are none."""
     if moment.uncertainty is not None:
         return np.asarray(moment.uncertainty.deviation[moment.index(action)])
-    error = moment.error_of(action)
-    return np.zeros(moment.time_axis.num_components) if error is None else error
+    judged = moment.judged(action)
+    return np.zeros(moment.time_axis.num_components) if judged is None else judged.off_by
 
 
 def _ends(moment: Moment, action: str, possible: Range) -> FloatArray | None:

@@ -3,6 +3,8 @@
 Needs the extra `interop`, which `make test` installs; without it these tests are skipped.
 """
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -17,11 +19,15 @@ import torch  # noqa: E402
 
 import trdlab  # noqa: E402
 from doors import Doors  # noqa: E402
+from trdlab.agents import given  # noqa: E402
 from trdlab.environments.spaces import frame_space  # noqa: E402
+from trdlab.explanations import assessment  # noqa: E402
+from trdlab.explanations import explanation as explaining  # noqa: E402
 from trdlab.policies import ask  # noqa: E402
 from trdlab.policies.files import Options  # noqa: E402
 from trdlab.policies.live import adapt as adapt_live  # noqa: E402
 from trdlab.policies.registry import read_policy  # noqa: E402
+from trdlab.rollouts.branches import Copying  # noqa: E402
 
 
 class Seen(gym.Env):
@@ -258,6 +264,41 @@ def test_masks_do_what_they_do_in_their_library(live, tmp_path):
     np.testing.assert_allclose(likely, told, rtol=2e-5, atol=1e-6)
     for greedy in (False, True):  # a closed door would be an error
         assert agent.evaluate(20, greedy=greedy).mean.value > 3
+
+
+@pytest.fixture
+def quick(monkeypatch) -> None:
+    """Makes what is usually played and learned less."""
+    monkeypatch.setitem(trdlab.fit.__kwdefaults__, "steps", 2_000)
+    monkeypatch.setitem(trdlab.fit.__kwdefaults__, "seconds", 1.0)
+    for module in (assessment, explaining):
+        monkeypatch.setattr(module, "usual_episodes", lambda agent: 4)
+    few = Copying(episodes=2, moments=1, copies=2, tries=2)
+    made = given.acting_agent
+    monkeypatch.setattr(given, "acting_agent", lambda *what: replace(made(*what), copying=few))
+
+
+def test_the_lines_of_the_guide_run_as_they_stand(quick, tmp_path, monkeypatch):
+    pytest.importorskip("Box2D", reason="needs pip install 'trdlab[box2d]'")
+    model = sb3.PPO(
+        "MlpPolicy", "LunarLander-v3", policy_kwargs={"net_arch": []}, seed=0, device="cpu"
+    )
+    steer = torch.zeros(4, 8)  # from position, speed, angle and turn to what it may do
+    steer[2, 3], steer[3, 2:6] = -20.0, torch.tensor([3.0, 0.0, 10.0, 10.0])
+    steer[1] = -steer[3]
+    with torch.no_grad():
+        model.policy.action_net.weight.copy_(steer)
+        model.policy.action_net.bias.copy_(torch.tensor([0.0, 0.0, -4.0, 0.0]))
+    model.save(tmp_path / "lander")
+    guide = (Path(__file__).parents[2] / "docs" / "fit.md").read_text(encoding="utf-8")
+    lines = guide.partition("```python\n")[2].partition("```")[0]
+    assert lines.count("trdlab.") == 4
+    monkeypatch.chdir(tmp_path)
+    left: dict[str, Any] = {}
+    exec(compile(lines, "fit.md", "exec"), left)
+    assert left["agent"].is_fitted
+    assert left["agent"].estimator.time_axis == trdlab.TimeAxis(0.99, 40)
+    assert str(left["explanation"]).startswith("PPO · step 120 of the episode with seed 3")
 
 
 def test_what_cannot_act_here_is_refused(tmp_path):

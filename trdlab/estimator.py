@@ -125,8 +125,8 @@ class Outlook:
     survival_reach: int = 0
     reach: Mapping[str, int] = field(default_factory=dict)
 
-    def __getitem__(self, index: int) -> "Outlook":
-        """Returns what is expected of one of the batch."""
+    def __getitem__(self, index: Any) -> "Outlook":
+        """Selects states and actions; the time axis stays whole."""
 
         def one(of: Mapping[Any, FloatArray]) -> dict[Any, FloatArray]:
             return {name: array[index] for name, array in of.items()}

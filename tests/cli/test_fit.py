@@ -161,7 +161,8 @@ def test_what_was_given_in_python_goes_on_in_python(tmp_path, capsys):
     assert "were given in Python. Go on there: trdlab.fit" in err
 
 
-def test_outcomes_are_named_on_the_command_line(tmp_path, capsys):
+def test_outcomes_are_named_on_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     words = ("fit", "gridworld:ledge", "--N", 2, "--steps", 2_000, "--time", "1s")
     out = ("--out", tmp_path / "fit")
     parts = ("--part", "coin=info.parts.coin", "--part", "hazard=info.parts.hazard")

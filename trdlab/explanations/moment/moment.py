@@ -84,6 +84,7 @@ class Moment:
         calibration: how good such forecasts are, if that has been judged.
         foils: the same of first actions that the policy does not take.
         seconds_per_step: how long a step takes as people play, if that is known.
+        forbidden: the names of actions that cannot be taken here; they are none of the A.
     """
 
     decomposition: RewardDecomposition
@@ -101,6 +102,7 @@ class Moment:
     calibration: "Calibration | None" = None
     foils: "Calibration | None" = None
     seconds_per_step: float | None = None
+    forbidden: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):
@@ -124,8 +126,11 @@ class Moment:
         """Returns the number of an action.
 
         Raises:
-            InputError: there is no such action; the message suggests one.
+            InputError: there is no such action, and the message suggests one; or it is forbidden.
         """
+        if action in self.forbidden:
+            allowed = ", ".join(self.action_names)
+            raise InputError(f"The environment forbids '{action}' here.", f"It allows {allowed}.")
         if action not in self.action_names:
             raise InputError(f"There is no action '{action}'.", closest(action, self.action_names))
         return self.action_names.index(action)

@@ -8,11 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trdlab
+from tests.shared.doors import Doors
 from trdlab.bellman import target as law
 from trdlab.deep.channels import Channel, groups_of
 from trdlab.deep.experience import Ahead, Experience, gather
 from trdlab.deep.fit import Fit
 from trdlab.deep.fit_settings import FitSettings
+from trdlab.environments import GymEnvironments
 from trdlab.environments.outcomes import Outcomes
 from trdlab.errors import InputError
 from trdlab.estimator import Future
@@ -297,3 +299,14 @@ def test_a_fitted_agent_acts_as_before_and_is_explained():
     assert fitted.estimator.future.policy == "the agent's own policy"
     page = str(trdlab.explain(fitted, episodes=20))
     assert "ledge · step 0 of the episode with seed 0" in page
+
+
+def test_forbidden_actions_are_not_forced_either():
+    def any_open(observations: np.ndarray) -> np.ndarray:
+        return np.tile([0.4, 0.3, 0.3], (len(observations), 1))
+
+    def make(count: int, seed: int) -> GymEnvironments:
+        return GymEnvironments(Doors, count, seed=seed)
+
+    of = gather(make, Memoryless(any_open), FUTURE, steps=400, share=0.9, num_envs=4, seed=0)
+    assert set(of.actions[of.steps].tolist()) == {0, 1, 2}, "and no door was closed: see Doors"

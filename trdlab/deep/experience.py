@@ -17,7 +17,7 @@ from trdlab.environments.outcomes import Outcomes
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.policies import Policy
-from trdlab.rollouts.playing import Playing
+from trdlab.rollouts.playing import Playing, any_actions
 from trdlab.rollouts.realised import next_flag
 from trdlab.time_axis import TimeAxis
 
@@ -236,7 +236,8 @@ def _played(
         seen = seen[running]  # a copy: what is seen changes with the step
         forced = running & (rng.random(count) < share) & (playing.steps >= free)
         free = np.where(forced, playing.steps + 1 + pause, free)
-        actions = np.where(forced, rng.integers(num_actions, size=count), turn.own)
+        others = any_actions(rng, count, num_actions, playing.allowed)
+        actions = np.where(forced, others, turn.own)
         step = playing.take(actions)
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
         which = np.flatnonzero(running)

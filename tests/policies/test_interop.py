@@ -235,6 +235,21 @@ def test_what_the_environment_normalises_is_normalised(tmp_path):
     assert repr(agent) == "<Agent: PPO · not fitted · action 0, action 1>"
 
 
+def test_what_is_normalised_of_several_parts_is_normalised(tmp_path):
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    inside = VecNormalize(DummyVecEnv([lambda: Doors("nowhere")]), norm_obs_keys=["time"])
+    how = {"n_steps": 32, "batch_size": 32, "seed": 0, "device": "cpu"}
+    model = sb3.PPO("MultiInputPolicy", inside, **how).learn(64)
+    model.save(tmp_path / "a")
+    inside.save(tmp_path / "a.pkl")
+    seen = np.float32([[1, 0, 1, 0.5], [1, 1, 1, 0.0]])
+    read = read_policy(tmp_path / "a.zip", Options(normalize=str(tmp_path / "a.pkl")))
+    np.testing.assert_allclose(ask(read, seen)[0], ask(adapt_live(model), seen)[0], rtol=1e-5)
+    plain = read_policy(tmp_path / "a.zip", Options())
+    assert (ask(read, seen)[0] != ask(plain, seen)[0]).all()
+
+
 def test_an_agent_that_sees_parts_acts_in_their_environment(tmp_path):
     model = sb3.PPO("MultiInputPolicy", Doors("nowhere"), n_steps=64, seed=0, device="cpu")
     model.save(tmp_path / "doors")

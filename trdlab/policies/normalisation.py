@@ -114,6 +114,11 @@ class _Inert:
 
     def __init__(self, *arguments: Any, **named: Any) -> None: ...
 
+    def __setitem__(self, key: Any, value: Any) -> None: ...
+
+    def append(self, item: Any) -> None:
+        """Does nothing, where a file fills a list of another kind."""
+
     def __setstate__(self, state: Any) -> None:
         parts = state if isinstance(state, tuple) else (state,)
         for part in parts:

@@ -196,7 +196,7 @@ def _round(whole: Fit, plain: Fit, count: int = 200) -> tuple[float, float, floa
 def _bare(fit: Fit) -> Callable[[], object]:
     """Returns an update of a fit's network towards targets that are there already."""
     shape = (fit.settings.batch_size, *fit.scale.shape)
-    batch = torch.from_numpy(fit.experience.observations[: fit.settings.batch_size])
+    batch = torch.from_numpy(fit.experience.frames[: fit.settings.batch_size])
     target = torch.zeros(shape)  # [K, C, N+1]
     actions = torch.from_numpy(fit.experience.actions[: fit.settings.batch_size])
     network = fit.network

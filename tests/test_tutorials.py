@@ -44,6 +44,10 @@ SOLUTIONS = {
     "6.1": "next(k for k in range(9) if abs(0.9**k - 0.81) < 1e-9)",
     "6.2": "[4, 0.5 * 1, 0.5 * (2 + 6)]",
     "6.3": "1",
+    "7.1": "1 - sum([0.1, 0.2, 0.3])",
+    "7.2": "0.405 / 0.9**2",
+    "7.3": "0.1 * 1 / 2",
+    "7.4": "[0.6, 0.5, 0.3, -0.1, 0.2, 0.1].index(-0.1) - 1",
 }
 
 
@@ -79,6 +83,8 @@ def exercises_of(lesson: Path) -> list[str]:
 @cache
 def printed_by(lesson: Path) -> str:
     """Returns what an unchanged lesson prints: each is run once, for all that is asked of it."""
+    if "stable_baselines3" in lesson.read_text(encoding="utf-8"):
+        pytest.importorskip("stable_baselines3", reason="needs pip install 'trdlab[interop]'")
     with TemporaryDirectory() as folder:
         printed = run(lesson, Path(folder))
         assert list(Path(folder).iterdir()) == []
@@ -93,6 +99,7 @@ def test_lessons_are_found() -> None:
         "04_why_the_sum_fails",
         "05_from_pixels",
         "06_debug_an_agent",
+        "07_explain_your_own",
     ]
 
 
@@ -208,6 +215,44 @@ def test_sixth_lesson_reads_to_a_student_what_is_wrong() -> None:
         "For everything that comes, the agent's forecasts are better than a guess."
         in reports["Dora"]
     )
+
+
+def test_seventh_lesson_says_what_its_numbers_show() -> None:
+    printed = printed_by(LESSONS[6])
+
+    def numbers(pattern: str) -> list[float]:
+        found = re.search(pattern, printed, re.MULTILINE)
+        assert found is not None
+        return [float(number) for number in found.groups()]
+
+    assert numbers(r"draws: +\d+ \(\d+ to (\d+)\)") < numbers(r"likeliest: +\d+ \((\d+) to \d+\)")
+    steps, worst, before, after = numbers(
+        r"The game has (\d+) steps\.\nStep (\d+): (\d+) before the draw, (\d+) after it\."
+    )
+    assert steps - 15 < worst < steps
+    assert after < 0.7 * before
+    lost, well = re.findall(r"^Tried out\n((?:  .*\n)+)", printed, re.MULTILINE)
+    assert re.search(r"When tried, .*the forecast, \S+, fits\.", " ".join(lost.split()))
+    assert "too few to tell whether" in " ".join(well.split())
+
+    left, right = (numbers(rf"{name} \[.*in all (\S+)$") for name in ("left", "right"))
+    assert left[0] > 3.0 * right[0]
+    for name in ("left", "right"):
+        fallen, over = numbers(rf"{name}: fallen in .* steps (\S+), no longer running (\S+)$")
+        assert abs(fallen - over) < 0.15
+    fall, running = numbers(r"^fall: (\d+) · still running: (\d+)$")
+    assert 0 < fall < running
+
+    row = r" +(\d+)" + r" +(-?\d\.\d\d)" * 3 + r" +t\+(\d+)$"
+    hasty, fitted = numbers("^ hasty" + row), numbers("^fitted" + row)
+    assert hasty[0] == fitted[0]
+    assert all(good > bad for good, bad in zip(fitted[1:-1], hasty[1:-1], strict=True))
+    assert (hasty[-1], fitted[-1]) == (0.0, 29.0)
+    copies, stumbling = (
+        re.findall(r"\d+", games) for games in re.findall(r": games of (.+) steps", printed)
+    )
+    assert len(set(copies)) == 1
+    assert len(set(stumbling)) > 5
 
 
 @pytest.mark.parametrize("name", exercise.EXERCISES)

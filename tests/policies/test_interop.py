@@ -232,7 +232,7 @@ def test_what_the_environment_normalises_is_normalised(tmp_path):
     inside.save(tmp_path / "a.pkl")
     read = trdlab.agent(f"{tmp_path}/a.zip,normalize={tmp_path}/a.pkl", env="CartPole-v1")
     np.testing.assert_allclose(ask(read.policy, seen)[0], told, rtol=1e-5)
-    assert repr(agent) == "<Agent: PPO · not fitted · action 0, action 1>"
+    assert repr(agent) == "<Agent: PPO · not fitted · push left, push right>"
 
 
 def test_what_is_normalised_of_several_parts_is_normalised(tmp_path):

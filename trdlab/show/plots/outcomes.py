@@ -107,6 +107,6 @@ def _stack(
 def _veiled(ax: Axes, axis: TimeAxis, reach: int, title: str) -> Axes:
     ends = style.positions(axis)[[reach, -1]] + (-0.5, 0.5)
     ax.axvspan(*ends, color=style.EVIDENCE["open"], alpha=_VEIL, linewidth=0, zorder=4)
-    ax.yaxis.set_major_locator(MaxNLocator(nbins=3))
+    ax.yaxis.set_major_locator(MaxNLocator(nbins=4))
     ax.set_title(title, fontsize=style.TITLE, loc="left")
     return ax

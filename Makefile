@@ -53,7 +53,7 @@ $(VENV)/installed: $(VENV)/python pyproject.toml
 	touch $@
 
 $(VENV)/installed-tests: $(VENV)/installed
-	$(PIP) -e '.[test,docs,interop]'
+	$(PIP) -e '.[test,docs,interop,box2d]'
 	touch $@
 
 LOWEST_PIP := $(VENV)-lowest/bin/python -m pip install --quiet --disable-pip-version-check

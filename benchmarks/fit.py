@@ -1,86 +1,240 @@
-"""Fits against exact answers: how far off is each method, for actions never taken, too?
+"""Fits against exact answers, and what they cost.
 
-A random policy of each world is frozen, a fifth of its actions is forced, and every component of
-every state and action is compared with the exact evaluation of that policy. Episodes begin
-anywhere.
+Policies are frozen, some of their actions are forced, and all that is told of every state and
+action is compared with the exact evaluation: components, the variance of each, survival, the parts
+of the reward and an event (to end without being paid). Episodes begin anywhere. An error is told as
+a share of the largest |Q|, that of a chance as it is.
 
-    python benchmarks/fit.py                      # three worlds, three methods, five seeds
+    python benchmarks/fit.py                      # three worlds, two policies, three methods
     python benchmarks/fit.py --seeds 1 --steps 200000
+    python benchmarks/fit.py --cost               # beside bare regression, and the environment
 """
 
 import argparse
 import time
+from collections.abc import Callable
+from functools import cache
 
 import gymnasium as gym
 import numpy as np
 import torch
 
-from trdlab.deep.experience import gather
+from trdlab.deep.experience import Experience, gather
 from trdlab.deep.fit import Fit
 from trdlab.deep.fit_settings import FitSettings, Method
+from trdlab.environments import GymEnvironments
+from trdlab.environments.outcomes import Outcomes
 from trdlab.estimator import Future
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
-from trdlab.tabular import MDP, exact
+from trdlab.tabular import MDP, exact, optimal
 from trdlab.tabular.episodes import ModelEnvironments
 from trdlab.tabular.toytext import make_world
+from trdlab.tabular.uncertainty import spread
 from trdlab.time_axis import TimeAxis
 
 AXIS = TimeAxis(0.95, 8)
 METHODS: tuple[Method, ...] = ("mixed", "regression", "td")
 FUTURE = Future("the given policy")
+UNPAID = "unpaid end"
+SHARE = {"mixed": 0.3, "td": 0.3, "regression": 0.1}
+"""Of forced actions: what comes after the next one is of no use for regression."""
+STEPS = {"FrozenLake": 2_000_000, "drone": 300_000, "ledge": 300_000}
+Parts = dict[str, np.ndarray]
 
 
-def worlds() -> dict[str, MDP]:
-    """Returns models of which everything is known."""
-    maps = {name: Gridworld(load_map(name).with_slip(0.1)).mdp for name in ("drone", "ledge")}
-    return {"FrozenLake": make_world("FrozenLake-v1", {}).mdp} | maps
+@cache
+def worlds() -> dict[str, tuple[MDP, Parts]]:
+    """Returns models of which everything is known, and what their rewards are made of."""
+    maps = {name: Gridworld(load_map(name).with_slip(0.1)) for name in ("drone", "ledge")}
+    drawn = {name: (world.mdp, world.parts) for name, world in maps.items()}
+    return {"FrozenLake": (make_world("FrozenLake-v1", {}).mdp, {})} | drawn
 
 
-def error(mdp: MDP, method: Method, steps: int, seed: int) -> tuple[float, float]:
-    """Returns the worst and the mean error of all components, as shares of the largest |Q|."""
-    logits = np.random.default_rng(seed).normal(size=mdp.shape)
-    policy = np.exp(logits) / np.exp(logits).sum(axis=1, keepdims=True)  # [S, A]
+def policies(mdp: MDP, seed: int) -> dict[str, np.ndarray]:
+    """Returns a random policy `[S, A]`, and one that takes good actions more often."""
+    q_values = optimal(mdp, AXIS.gamma).q_values
+    logits = {
+        "random": np.random.default_rng(seed).normal(size=mdp.shape),
+        "soft-optimal": 10.0 * q_values / np.abs(q_values).max(),
+    }
+    return {name: np.exp(of) / np.exp(of).sum(axis=1, keepdims=True) for name, of in logits.items()}
+
+
+def played(name: str, policy: np.ndarray, steps: int, seed: int, share: float) -> Experience:
+    """Returns what a policy did, with what else is forecast of it."""
+    mdp, parts = worlds()[name]
     alive = ~mdp.terminal_states
-    experience = gather(
+    return gather(
         lambda count, own: ModelEnvironments(
-            mdp, count, seed=own, starts=alive / alive.sum(), time_limit=200
+            mdp, count, seed=own, starts=alive / alive.sum(), time_limit=200, parts=parts
         ),
         Memoryless(lambda states: policy[states]),
         FUTURE,
         steps=steps,
-        share=0.2,
-        pause=AXIS.num_steps if method == "regression" else 0,
+        share=share,
         num_envs=1_000,
         seed=seed,
+        outcomes=Outcomes(outcomes(parts)),
     )
-    how = FitSettings(method, learning_rate=0.01, batch_size=1_024, seed=seed)
-    fit = Fit(experience, gym.spaces.Discrete(mdp.num_states), AXIS, how)
-    fit.run()
-    told = fit.estimator(FUTURE).decompose(np.flatnonzero(alive)).components
+
+
+def outcomes(parts: Parts) -> dict[str, Callable | str]:
+    """Returns what is forecast beside the reward."""
+    unpaid = {UNPAID: lambda step: step.terminated and step.reward <= 0.0}
+    return {name: f"info.parts.{name}" for name in parts} | unpaid
+
+
+def errors(
+    name: str, policy: np.ndarray, experience: Experience, method: Method, seed: int
+) -> dict[str, float]:
+    """Returns the largest error of each kind, as a share of the largest |Q|, or of a chance."""
+    mdp, parts = worlds()[name]
+    alive = ~mdp.terminal_states
+    states = np.flatnonzero(alive)
+    fit = Fit(
+        experience,
+        gym.spaces.Discrete(mdp.num_states),
+        AXIS,
+        FitSettings(method, batch_size=512, most_updates=8_000, seed=seed),
+        names=tuple(outcomes(parts)),
+        parts=tuple(parts),
+    )
+    while not fit.done:
+        fit.learn()
+    estimator = fit.estimator(FUTURE)
+    told, outlook = estimator.decompose(states).components, estimator.outlook(states)
     true = exact(mdp, AXIS, policy=policy)
-    apart = np.abs(told - true.decomposition.components[alive]).max(axis=-1)
-    scale = np.abs(true.solution.q_values).max()
-    return float(apart.max() / scale), float(apart.mean() / scale)
+    known, scale = spread(true), np.abs(true.solution.q_values).max()
+    ended = exact(
+        mdp.with_rewards((mdp.terminated & (mdp.rewards <= 0.0)) * 1.0), AXIS, policy=policy
+    )
+    chances = ended.decomposition.components[alive][..., :-1] / AXIS.discounts[:-1]
+    made_of = [
+        np.abs(outlook.parts[part] - _table(mdp.with_rewards(paid), policy)[alive]).max() / scale
+        for part, paid in parts.items()
+    ]
+    return {
+        "components": np.abs(told - true.decomposition.components[alive]).max() / scale,
+        "variance": np.abs(outlook.variance - known.variance[alive][..., :-1]).max() / scale,
+        "survival": np.abs(outlook.survival - known.survival[alive]).max(),
+        "parts": max(made_of, default=0.0),
+        "event": np.abs(outlook.events[UNPAID] - chances).max(),
+    }
+
+
+def _table(mdp: MDP, policy: np.ndarray) -> np.ndarray:
+    return exact(mdp, AXIS, policy=policy).decomposition.components
+
+
+def truth(steps: int | None, seeds: int) -> None:
+    """Prints the errors of every method, the worst of all seeds."""
+    kinds = ["components", "variance", "survival", "parts", "event"]
+    print(f"| world | policy | method | {' | '.join(kinds)} | seconds |")
+    print(f"|---|---|---|{'--:|' * (len(kinds) + 1)}", flush=True)
+    for name, (mdp, _) in worlds().items():
+        for kind in policies(mdp, 0):
+            worst = {method: dict.fromkeys(kinds, 0.0) for method in METHODS}
+            took = dict.fromkeys(METHODS, 0.0)
+            for seed in range(seeds):
+                policy = policies(mdp, seed)[kind]
+                count = steps or STEPS[name]
+                seen = {
+                    share: played(name, policy, count, seed, share) for share in {*SHARE.values()}
+                }
+                for method in METHODS:
+                    began = time.perf_counter()
+                    found = errors(name, policy, seen[SHARE[method]], method, seed)
+                    worst[method] = {of: max(worst[method][of], found[of]) for of in kinds}
+                    took[method] += (time.perf_counter() - began) / seeds
+            for method in METHODS:
+                told = " | ".join(f"{100.0 * worst[method][of]:.1f} %" for of in kinds)
+                print(f"| {name} | {kind} | {method} | {told} | {took[method]:.0f} |", flush=True)
+
+
+def cost(steps: int) -> None:
+    """Prints what an update and a step cost, beside the least that they could."""
+    env_id, rng = "CartPole-v1", np.random.default_rng(0)
+    space = gym.make(env_id).observation_space
+
+    def policy(observations: np.ndarray) -> np.ndarray:
+        right = np.where(observations[:, 2] + 0.5 * observations[:, 3] > 0.0, 0.85, 0.15)
+        return np.column_stack([1.0 - right, right])
+
+    def make(count: int, seed: int) -> GymEnvironments:
+        return GymEnvironments(env_id, count, seed=seed)
+
+    began = time.perf_counter()
+    experience = gather(make, Memoryless(policy), FUTURE, steps=steps, share=0.1, seed=0)
+    ours = len(experience.steps) / (time.perf_counter() - began)
+    env = gym.make(env_id)
+    env.reset(seed=0)
+    began = time.perf_counter()
+    for action in rng.integers(2, size=steps):
+        _, _, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
+            env.reset()
+    alone = steps / (time.perf_counter() - began)
+    print(f"rollouts: {ours:,.0f} steps/s, {100.0 * ours / alone:.0f} % of {env_id} alone")
+    for method in METHODS:
+        whole = Fit(experience, space, TimeAxis(0.99, 40), FitSettings(method))
+        plain = Fit(experience, space, TimeAxis(0.99, 0), FitSettings(method))
+        rounds = [_round(whole, plain) for _ in range(7)]
+        own, bare, value = np.median(rounds, axis=0) * 1e3
+        print(
+            f"{method:>10}, N = 40: {own:.2f} ms an update; {own / bare:.2f} times bare regression "
+            f"of the same network, {own / value:.2f} times N = 0",
+            flush=True,
+        )
+
+
+def _round(whole: Fit, plain: Fit, count: int = 200) -> tuple[float, float, float]:
+    """Returns the seconds of an update of a fit, of bare regression, and of a fit with N = 0."""
+    return (
+        _seconds(whole.update, count),
+        _seconds(_bare(whole), count),
+        _seconds(plain.update, count),
+    )
+
+
+def _bare(fit: Fit) -> Callable[[], object]:
+    """Returns an update of a fit's network towards targets that are there already."""
+    shape = (fit.settings.batch_size, *fit.scale.shape)
+    batch = torch.from_numpy(fit.experience.frames[: fit.settings.batch_size])
+    target = torch.zeros(shape)  # [K, C, N+1]
+    actions = torch.from_numpy(fit.experience.actions[: fit.settings.batch_size])
+    network = fit.network
+    optimizer = torch.optim.Adam(network.parameters(), lr=0.0, fused=True)
+
+    def update() -> float:
+        told = network(batch).reshape(shape[0], -1, *shape[1:])[range(shape[0]), actions]
+        loss = (told - target).square().sum() / shape[0]
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        optimizer.step()
+        return loss.item()
+
+    return update
+
+
+def _seconds(update: Callable[[], object], count: int) -> float:
+    began = time.perf_counter()
+    for _ in range(count):
+        update()
+    return (time.perf_counter() - began) / count
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=1_000_000)
+    parser.add_argument("--steps", type=int, help=f"By default {STEPS}.")
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--cost", action="store_true")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    for name, mdp in worlds().items():
-        for method in METHODS:
-            began = time.perf_counter()
-            found = [error(mdp, method, options.steps, seed) for seed in range(options.seeds)]
-            worst, mean = (100.0 * max(of) for of in zip(*found, strict=True))
-            took = (time.perf_counter() - began) / options.seeds
-            print(
-                f"{name:>10} {method:>10}: off by at most {worst:4.1f} % of the largest |Q|, by "
-                f"{mean:4.2f} % on average, {took:.0f} s each",
-                flush=True,
-            )
+    if options.cost:
+        cost(options.steps or 50_000)
+    else:
+        truth(options.steps, options.seeds)
 
 
 if __name__ == "__main__":

@@ -138,11 +138,12 @@ def test_calibration_and_comparison_are_one_call_each():
     comparison = trdlab.compare(
         "gridworld:ledge", "gridworld:ledge,slip=0.3", episodes=3, gamma=0.9
     )
-    assert comparison.names == ("ledge", "ledge,slip=0.3")
+    assert [agent.name for agent in comparison.agents] == ["ledge", "ledge,slip=0.3"]
     assert comparison.time_axis.gamma == 0.9
     world = Gridworld(load_map("ledge"))
     again = trdlab.compare(trdlab.solve("ledge"), world, episodes=3)
-    assert again.words == (("gridworld:ledge",), ())
+    origins = [agent.origin for agent in again.agents]
+    assert [origin and origin.name for origin in origins] == ["gridworld:ledge", None]
     assert not again.difference.value.any()
 
 

@@ -151,8 +151,8 @@ class Outlook:
         cut = {name: of[name][..., :count] for name, count in reach.items() if count}
         return {name: array.astype(np.float64) for name, array in cut.items()}
 
-    def __getitem__(self, index: int) -> "Outlook":
-        """Returns what is expected of one of the batch."""
+    def __getitem__(self, index: Any) -> "Outlook":
+        """Selects states and actions; the time axis stays whole."""
 
         def one(of: Mapping[Any, FloatArray]) -> dict[Any, FloatArray]:
             return {name: array[index] for name, array in of.items()}

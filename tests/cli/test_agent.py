@@ -15,7 +15,9 @@ from archives import (
     data,
     drawn,
     layers,
+    ppo_shapes,
     save_archive,
+    several,
     tensors,
     torch_bytes,
 )
@@ -86,6 +88,27 @@ def test_a_file_of_python_and_plain_layers(trdlab, tmp_path):
     code, out, _ = trdlab("agent", "a.pth", *lake, "--episodes", 3)
     assert code == 0
     assert "network 16 → 4" in " ".join(out.split())
+
+
+def test_parts_and_forbidden_actions_are_the_environments(trdlab, tmp_path):
+    source = Path(__file__).parents[1] / "shared" / "doors.py"
+    registered = f'{source.read_text(encoding="utf-8")}\n\ngym.register("Doors-v0", Doors)\n'
+    (tmp_path / "cli_doors.py").write_text(registered, encoding="utf-8")
+    said = several("{'open': MultiBinary(3), 'time': Box(0.0, 1.0, (1,), float32)}")
+    beside = data("sb3_contrib.common.maskable.policies", said, actions=3, clip_range=1)
+    save_archive(tmp_path / "mine.zip", drawn(ppo_shapes(actions=3)), beside)
+    words = ("agent", "mine.zip", "--env", "cli_doors:Doors-v0")
+    for more in ((), ("--greedy",)):  # a closed door would be an error
+        code, out, err = trdlab(*words, "--episodes", 10, *more)
+        assert (code, err) == (0, "")
+        assert "agent MaskablePPO of Stable-Baselines3 2.3.0" in " ".join(out.split())
+        assert "mean length 6.0 agent steps" in " ".join(out.split())
+    code, _, err = trdlab("agent", "mine.zip", "--env", "Blackjack-v1")
+    assert (code, err) == (
+        2,
+        "error: 'Blackjack-v1' does not fit 'mine': it has 45 float32 to see and 2 actions. This "
+        "MaskablePPO needs a Dict of 'open' (3,), 'time' (1,) and 3 actions.\n",
+    )
 
 
 @pytest.mark.parametrize("command", ["explain", "compare"])

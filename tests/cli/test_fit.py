@@ -145,23 +145,33 @@ def test_a_fit_that_was_stopped_while_it_played_begins_again(tmp_path):
     path = tmp_path / "ledge"
     with pytest.raises(Stopped, match="before anything was learned"):
         trdlab.fit("gridworld:ledge", out=path, should_stop=lambda: True, **QUICK)  # type: ignore[arg-type]
-    with pytest.raises(TrdlabError, match=r"Nothing has been learned yet .* trdlab resume"):
-        trdlab.load(path)
+    assert not path.exists(), "there is nothing to keep"
     assert trdlab.fit("gridworld:ledge", out=path, **QUICK).is_fitted  # type: ignore[arg-type]
 
 
+def test_a_fit_is_listed_with_runs_and_is_none(kept: Path, capsys):
+    code, out, _ = run(capsys, "runs", kept.parent)
+    assert code == 0
+    assert re.search(r"ledge +gridworld:ledge +3 +1 +4000 +a fit, \d+ updates", out)
+    code, _, err = run(capsys, "evaluate", kept)
+    assert code == 2
+    assert f"is a fit, and no training run. Its agent is played by: trdlab agent {kept}" in err
+
+
 def test_what_was_given_in_python_goes_on_in_python(tmp_path, capsys):
+    asked = iter([False, False, True])  # twice while it plays
     given = {"fell": lambda step: step.terminated}
-    stopped = {"out": tmp_path / "fit", "should_stop": lambda: True, "outcomes": given, **QUICK}
+    stopped = {"out": tmp_path / "fit", "should_stop": lambda: next(asked), "outcomes": given}
     with pytest.raises(Stopped):
-        trdlab.fit("gridworld:ledge", **stopped)  # type: ignore[arg-type]
+        trdlab.fit("gridworld:ledge", **stopped, **QUICK)  # type: ignore[arg-type]
     code, _, err = run(capsys, "resume", tmp_path / "fit")
     assert code == 2
     assert "The outcomes of" in err
     assert "were given in Python. Go on there: trdlab.fit" in err
 
 
-def test_outcomes_are_named_on_the_command_line(tmp_path, capsys):
+def test_outcomes_are_named_on_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     words = ("fit", "gridworld:ledge", "--N", 2, "--steps", 2_000, "--time", "1s")
     out = ("--out", tmp_path / "fit")
     parts = ("--part", "coin=info.parts.coin", "--part", "hazard=info.parts.hazard")

@@ -49,7 +49,8 @@ def _counter():
 
 
 def same(a: Step, b: Step) -> bool:
-    return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(Step))
+    names = [field.name for field in fields(Step) if field.name != "info"]
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
 
 
 def acted(environments: Environments, steps: int, seed: int = 0) -> list[Step]:
@@ -237,7 +238,23 @@ def test_other_observations_stay_as_they_are(space, stack):
             {"slip": 2},
             "The slip probability is 2. It must lie between 0 and 1.",
         ),
-        ("Pendulum-v1", {}, "The action space of Pendulum-v1 is Box(-2.0, 2.0, (1,), float32)"),
+        (
+            "Pendulum-v1",
+            {},
+            "The action space of Pendulum-v1 is Box(-2.0, 2.0, (1,), float32). A decomposition has "
+            "one row per action. Name a few actions to choose from: gymnasium.wrappers.",
+        ),
+        (
+            "Counter-v0",
+            {"action_space": gym.spaces.MultiBinary(3)},
+            "The action space of Counter-v0 is MultiBinary(3). A decomposition has one row per "
+            "action: use an environment with a Discrete or MultiDiscrete one.",
+        ),
+        (
+            "Counter-v0",
+            {"action_space": gym.spaces.MultiDiscrete([10, 10, 10])},
+            "These are 1,000 combinations. A decomposition has one row for each: name 256 of them",
+        ),
         (
             "Counter-v0",
             {"observation_space": gym.spaces.Dict(say=gym.spaces.Text(9))},
@@ -303,6 +320,39 @@ def test_copies_are_made_of_environments_that_show_several_parts():
     assert environments.reset().shape == (2, 32 + 11 + 2)
     copies = environments.branch(np.array([0, 1, 1]), seed=1)
     assert copies.step(np.array([0, 0, 0])).terminated.all()
+
+
+def test_actions_of_several_parts_are_numbered_and_named():
+    turns = gym.spaces.MultiDiscrete([2, 3], start=[0, 5])
+    names = (["stay", "jump"], ["left", "on", "right"])
+    environments = [
+        GymEnvironments("Counter-v0", seed=0, env_arguments={"action_space": turns, "names": given})
+        for given in (names, "", [f"way {i}" for i in range(6)], (["stay"], ["left", "on"]))
+    ]
+    joined = ("stay+left", "stay+on", "stay+right", "jump+left", "jump+on", "jump+right")
+    assert environments[0].action_names == joined
+    assert environments[2].action_names[4:] == ("way 4", "way 5")
+    numbers = ("action 0+0", "action 0+1", "action 0+2", "action 1+0", "action 1+1", "action 1+2")
+    assert environments[1].action_names == environments[3].action_names == numbers
+    taken = []
+    environments[0]._envs[0].unwrapped.step = lambda action: (
+        taken.append(action.tolist()) or (np.zeros(2), 0.0, False, False, {})
+    )
+    environments[0].reset()
+    for action in range(6):
+        environments[0].step(np.array([action]))
+    assert taken == [[0, 5], [0, 6], [0, 7], [1, 5], [1, 6], [1, 7]]
+
+
+def test_the_masks_of_parts_allow_what_all_of_them_allow():
+    space = gym.spaces.MultiDiscrete([2, 2])  # of which there are as many actions as choices
+    environments = GymEnvironments("Counter-v0", seed=0, env_arguments={"action_space": space})
+    environments._envs[0].unwrapped.action_masks = lambda: [True, False, True, True]
+    environments.reset()
+    assert environments.allowed.tolist() == [[True, True, False, False]]
+    assert environments.branch(np.array([0]), seed=0).allowed.tolist() == [
+        [True, True, False, False]
+    ]
 
 
 def test_a_missing_extra_is_named(monkeypatch):

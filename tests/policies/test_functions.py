@@ -2,8 +2,10 @@
 
 import sys
 
+import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.wrappers import TransformAction
 
 import trdlab
 from doors import Doors
@@ -109,6 +111,21 @@ def test_a_function_is_shown_the_parts_of_an_observation():
     assert min(returns[0]) > 6
     cards = trdlab.agent(lambda hand: int(hand[0] < 18), env="Blackjack-v1")  # a Tuple
     assert cards.evaluate(20).mean.value > -0.8
+
+
+def test_an_agent_with_continuous_actions_is_explained_by_the_nearest_of_a_few():
+    torques = np.float32([[-2], [0], [2]])
+
+    def pendulum():
+        env = gym.make("Pendulum-v1")
+        return TransformAction(env, lambda i: torques[i], gym.spaces.Discrete(len(torques)))
+
+    def nearest(seen):
+        wanted = np.float32([-seen[2]])  # what an agent of another library would do
+        return int(np.abs(torques - wanted).sum(axis=1).argmin())
+
+    agent = trdlab.agent(nearest, env=pendulum, action_names=["left", "none", "right"])
+    assert agent.evaluate(2, max_steps=20).lengths.tolist() == [20, 20]
 
 
 def test_what_is_expected_of_observations_with_parts_is_fitted():

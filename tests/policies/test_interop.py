@@ -3,6 +3,8 @@
 Needs the extra `interop`, which `make test` installs; without it these tests are skipped.
 """
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -17,18 +19,22 @@ import torch  # noqa: E402
 
 import trdlab  # noqa: E402
 from doors import Doors  # noqa: E402
+from trdlab.agents import given  # noqa: E402
 from trdlab.environments.spaces import frame_space  # noqa: E402
+from trdlab.explanations import assessment  # noqa: E402
+from trdlab.explanations import explanation as explaining  # noqa: E402
 from trdlab.policies import ask  # noqa: E402
 from trdlab.policies.files import Options  # noqa: E402
 from trdlab.policies.live import adapt as adapt_live  # noqa: E402
 from trdlab.policies.registry import read_policy  # noqa: E402
+from trdlab.rollouts.branches import Copying  # noqa: E402
 
 
 class Seen(gym.Env):
     """Shows whatever is drawn from its space."""
 
-    def __init__(self, space: gym.Space[Any]) -> None:
-        self.observation_space, self.action_space = space, gym.spaces.Discrete(3)
+    def __init__(self, space: gym.Space[Any], actions: gym.Space[Any]) -> None:
+        self.observation_space, self.action_space = space, actions
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
@@ -38,7 +44,7 @@ class Seen(gym.Env):
         return self.observation_space.sample(), 1.0, False, False, {}
 
     def action_masks(self):
-        return [True] * 3
+        return [True] * gym.spaces.flatdim(self.action_space)
 
 
 VECTOR = gym.spaces.Box(-3, 3, (5,))
@@ -55,6 +61,7 @@ PARTS = gym.spaces.Dict(
 )
 PICTURED = gym.spaces.Dict({"seen": IMAGE, "at": VECTOR, "act": VECTOR})
 BACKWARDS = gym.spaces.Dict([("z", VECTOR), ("it's, Box(", IMAGE), ("a", STATES)])
+TURNS = gym.spaces.MultiDiscrete([2, 3], start=[0, 5])
 RELU = {"activation_fn": torch.nn.ReLU, "net_arch": [8]}
 OFF_POLICY = {"buffer_size": 10, "learning_starts": 1}
 LSTM = {"lstm_hidden_size": 8}
@@ -109,6 +116,11 @@ CASES = {
     "PPO of parts, not divided": (
         sb3.PPO, "MultiInputPolicy", PICTURED, {"policy_kwargs": {"normalize_images": False}}
     ),
+    "PPO of turns": (sb3.PPO, "MlpPolicy", VECTOR, {}),
+    "MaskablePPO of turns": (contrib.MaskablePPO, "MlpPolicy", VECTOR, {}),
+    "RecurrentPPO of turns": (
+        contrib.RecurrentPPO, "MlpLstmPolicy", VECTOR, {"policy_kwargs": LSTM}
+    ),
     "A2C of parts": (sb3.A2C, "MultiInputPolicy", PARTS, {}),
     "MaskablePPO of parts": (contrib.MaskablePPO, "MultiInputPolicy", PICTURED, {}),
     "RecurrentPPO of parts": (
@@ -120,7 +132,8 @@ CASES = {
 @pytest.fixture(params=CASES)
 def model(request) -> Any:
     kind, policy, space, how = CASES[request.param]
-    made = kind(policy, Seen(space), seed=3, device="cpu", **how)
+    actions = TURNS if "turns" in request.param else gym.spaces.Discrete(3)
+    made = kind(policy, Seen(space, actions), seed=3, device="cpu", **how)
     with torch.no_grad():  # fresh networks hardly prefer anything
         for parameter in made.policy.parameters():
             parameter.mul_(3.0)
@@ -148,6 +161,15 @@ def as_shown(space: gym.Space[Any], observations: list[Any]) -> np.ndarray:
     return np.moveaxis(batch, -1, 1) if batch.ndim == 4 else batch
 
 
+def likelihoods(told: Any) -> np.ndarray:
+    """Returns the probability of each action; of two parts that of each pair."""
+    of = getattr(told, "distributions", None) or told.distribution
+    if not isinstance(of, list):
+        return of.probs.numpy()
+    one, other = (part.probs.numpy() for part in of)
+    return np.einsum("bi,bj->bij", one, other).reshape(len(one), -1)
+
+
 def theirs(model: Any, observations: np.ndarray, state: Any, begins: np.ndarray) -> np.ndarray:
     """Returns what the library itself computes: values, or probabilities, and its memory."""
     seen, _ = model.policy.obs_to_tensor(observations)
@@ -157,12 +179,12 @@ def theirs(model: Any, observations: np.ndarray, state: Any, begins: np.ndarray)
         if hasattr(model.policy, "quantile_net"):
             return model.policy.quantile_net(seen).mean(dim=1).numpy(), None
         if not hasattr(model.policy, "lstm_actor"):
-            return model.policy.get_distribution(seen).distribution.probs.numpy(), None
+            return likelihoods(model.policy.get_distribution(seen)), None
         lstm = model.policy.lstm_actor
         blank = torch.zeros(lstm.num_layers, len(begins), lstm.hidden_size)
         state = (blank, blank) if state is None else state
         told, state = model.policy.get_distribution(seen, state, torch.tensor(begins).float())
-        return told.distribution.probs.numpy(), state
+        return likelihoods(told), state
 
 
 @pytest.mark.parametrize("live", [False, True], ids=["archive", "loaded"])
@@ -183,12 +205,11 @@ def test_every_algorithm_acts_as_its_library_says(model, live, tmp_path):
         np.testing.assert_allclose(own, told, rtol=2e-5, atol=5e-5)
         chosen = np.take_along_axis(told, likely.argmax(axis=1)[:, None], axis=1)[:, 0]
         np.testing.assert_allclose(chosen, told.max(axis=1), rtol=2e-5, atol=5e-5)
-    assert (policy.about.algorithm.replace("-", ""), policy.about.num_actions) == (
-        name.replace("-", ""),
-        3,
-    )
+    assert policy.about.algorithm.replace("-", "") == name.replace("-", "")
+    assert policy.about.num_actions == (3 if made.action_space != TURNS else 6)
     assert policy.about.gamma == 0.99
-    assert policy.about.layers.endswith(" → 15" if name == "QR-DQN" else " → 3")
+    outputs = 15 if name == "QR-DQN" else gym.spaces.flatdim(made.action_space)
+    assert policy.about.layers.endswith(f" → {outputs}")
     assert policy.about.version
     assert (policy.about.memory > 0) == (name == "RecurrentPPO") == (mine is not None)
 
@@ -214,6 +235,21 @@ def test_what_the_environment_normalises_is_normalised(tmp_path):
     assert repr(agent) == "<Agent: PPO · not fitted · action 0, action 1>"
 
 
+def test_what_is_normalised_of_several_parts_is_normalised(tmp_path):
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    inside = VecNormalize(DummyVecEnv([lambda: Doors("nowhere")]), norm_obs_keys=["time"])
+    how = {"n_steps": 32, "batch_size": 32, "seed": 0, "device": "cpu"}
+    model = sb3.PPO("MultiInputPolicy", inside, **how).learn(64)
+    model.save(tmp_path / "a")
+    inside.save(tmp_path / "a.pkl")
+    seen = np.float32([[1, 0, 1, 0.5], [1, 1, 1, 0.0]])
+    read = read_policy(tmp_path / "a.zip", Options(normalize=str(tmp_path / "a.pkl")))
+    np.testing.assert_allclose(ask(read, seen)[0], ask(adapt_live(model), seen)[0], rtol=1e-5)
+    plain = read_policy(tmp_path / "a.zip", Options())
+    assert (ask(read, seen)[0] != ask(plain, seen)[0]).all()
+
+
 def test_an_agent_that_sees_parts_acts_in_their_environment(tmp_path):
     model = sb3.PPO("MultiInputPolicy", Doors("nowhere"), n_steps=64, seed=0, device="cpu")
     model.save(tmp_path / "doors")
@@ -226,9 +262,63 @@ def test_an_agent_that_sees_parts_acts_in_their_environment(tmp_path):
         trdlab.agent(tmp_path / "doors.zip", env="CartPole-v1")
 
 
+@pytest.mark.parametrize("live", [False, True], ids=["archive", "loaded"])
+def test_masks_do_what_they_do_in_their_library(live, tmp_path):
+    model = contrib.MaskablePPO("MultiInputPolicy", Doors(), n_steps=64, seed=0, device="cpu")
+    model.learn(128)
+    model.save(tmp_path / "doors")
+    what = model if live else tmp_path / "doors.zip"
+    agent, rng = trdlab.agent(what, env=Doors), np.random.default_rng(0)
+    observations, allowed = drawn(Doors().observation_space, 200), rng.random((200, 3)) < 0.5
+    allowed[:, 1] |= ~allowed.any(axis=1)
+    seen, _ = model.policy.obs_to_tensor(together(observations))
+    with torch.no_grad():
+        told = model.policy.get_distribution(seen, action_masks=allowed).distribution.probs.numpy()
+    shown = as_shown(Doors().observation_space, observations)
+    likely = ask(agent.policy, shown, allowed=allowed)[0]
+    np.testing.assert_allclose(likely, told, rtol=2e-5, atol=1e-6)
+    for greedy in (False, True):  # a closed door would be an error
+        assert agent.evaluate(20, greedy=greedy).mean.value > 3
+
+
+@pytest.fixture
+def quick(monkeypatch) -> None:
+    """Makes what is usually played and learned less."""
+    monkeypatch.setitem(trdlab.fit.__kwdefaults__, "steps", 2_000)
+    monkeypatch.setitem(trdlab.fit.__kwdefaults__, "seconds", 1.0)
+    for module in (assessment, explaining):
+        monkeypatch.setattr(module, "usual_episodes", lambda agent: 4)
+    few = Copying(episodes=2, moments=1, copies=2, tries=2)
+    made = given.acting_agent
+    monkeypatch.setattr(given, "acting_agent", lambda *what: replace(made(*what), copying=few))
+
+
+def test_the_lines_of_the_guide_run_as_they_stand(quick, tmp_path, monkeypatch):
+    pytest.importorskip("Box2D", reason="needs pip install 'trdlab[box2d]'")
+    model = sb3.PPO(
+        "MlpPolicy", "LunarLander-v3", policy_kwargs={"net_arch": []}, seed=0, device="cpu"
+    )
+    steer = torch.zeros(4, 8)  # from position, speed, angle and turn to what it may do
+    steer[2, 3], steer[3, 2:6] = -20.0, torch.tensor([3.0, 0.0, 10.0, 10.0])
+    steer[1] = -steer[3]
+    with torch.no_grad():
+        model.policy.action_net.weight.copy_(steer)
+        model.policy.action_net.bias.copy_(torch.tensor([0.0, 0.0, -4.0, 0.0]))
+    model.save(tmp_path / "lander")
+    guide = (Path(__file__).parents[2] / "docs" / "fit.md").read_text(encoding="utf-8")
+    lines = guide.partition("```python\n")[2].partition("```")[0]
+    assert lines.count("trdlab.") == 4
+    monkeypatch.chdir(tmp_path)
+    left: dict[str, Any] = {}
+    exec(compile(lines, "fit.md", "exec"), left)
+    assert left["agent"].is_fitted
+    assert left["agent"].estimator.time_axis == trdlab.TimeAxis(0.99, 40)
+    assert str(left["explanation"]).startswith("PPO · step 120 of the episode with seed 3")
+
+
 def test_what_cannot_act_here_is_refused(tmp_path):
     model = sb3.PPO("MlpPolicy", "Pendulum-v1", device="cpu")
-    with pytest.raises(trdlab.errors.InputError, match="actions of this PPO are Box"):
+    with pytest.raises(trdlab.errors.InputError, match="action space of this PPO is Box"):
         trdlab.agent(model, env="CartPole-v1")
     model.save(tmp_path / "box")
     with pytest.raises(trdlab.errors.InputError, match=r"actions of the agent in .* are a Box"):

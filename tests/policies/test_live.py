@@ -78,7 +78,7 @@ def test_probabilities_are_drawn_from_and_observations_normalised():
     [
         (
             Model(Standing(q_net=nn.Linear(4, 2)), gym.spaces.Box(-1, 1, (2,))),
-            "of this Model are Box",
+            "action space of this Model is Box.*Let the environment take a few by their numbers",
         ),
         (Model(Standing()), "has no values of actions, and no distribution over them"),
         (Model(Standing(q_net=nn.Linear(4, 3))), "gives 3 probabilities, and 'CartPole-v1' has 2"),

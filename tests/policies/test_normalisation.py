@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from archives import cartpole_dqn, cartpole_ppo
+from archives import cartpole_dqn, cartpole_ppo, data, drawn, ppo_shapes, save_archive, several
 from trdlab.errors import InputError
 from trdlab.policies import ask
 from trdlab.policies.files import Options
@@ -27,9 +27,11 @@ def save(tmp_path, monkeypatch):
         kind = type(name, (), {"__module__": "stable_baselines3"})
         monkeypatch.setattr(module, name, kind, raising=False)
 
-    def written(**held):
+    def written(by_part="", **held):
+        monkeypatch.setitem(sys.modules, "stable_baselines3", module)
         statistics, whole = module.RunningMeanStd(), module.VecNormalize()
         statistics.__dict__.update(mean=MEANS, var=VARIANCES, count=np.float64(7.0))
+        statistics = {by_part: statistics} if by_part else statistics
         usual = {"norm_obs": True, "obs_rms": statistics, "clip_obs": 3.0, "epsilon": 1e-8}
         whole.__dict__.update(usual | held)
         path = tmp_path / "vecnormalize.pkl"
@@ -51,6 +53,25 @@ def test_observations_are_normalised_as_they_were_in_training(tmp_path, save, wr
     assert policy.about == plain.about
     if hasattr(plain, "q_values"):
         np.testing.assert_array_equal(policy.q_values(SEEN), plain.q_values(seen))
+
+
+def test_parts_of_observations_are_normalised_each_or_left_alone(tmp_path, save, monkeypatch):
+    said = several("{'at': Box(-9.0, 9.0, (2,), float32), 'key': Discrete(2)}")
+    beside = data("stable_baselines3.common.policies", said, clip_range=1)
+    agent = save_archive(tmp_path / "a.zip", drawn(ppo_shapes()), beside)
+    monkeypatch.setitem(globals(), "MEANS", MEANS[2:])
+    monkeypatch.setitem(globals(), "VARIANCES", VARIANCES[2:])
+    plain, path = read_policy(agent, Options()), save(by_part="at")
+    policy = read_policy(agent, Options.of({"normalize": str(path)}))
+    seen = SEEN.copy()
+    seen[:, :2] = np.clip((SEEN[:, :2] - MEANS) / np.sqrt(VARIANCES + 1e-8), -3.0, 3.0)
+    np.testing.assert_array_equal(ask(policy, SEEN)[0], ask(plain, seen)[0])
+    for name, message in (
+        ("door", r"is of \['door'\], and the agent sees \['at', 'key'\]"),
+        ("", r"is of one thing, and the agent sees \['at', 'key'\]"),
+    ):
+        with pytest.raises(InputError, match=message):
+            read_policy(agent, Options.of({"normalize": str(save(by_part=name))}))
 
 
 def test_where_observations_were_left_alone_they_are(tmp_path, save):

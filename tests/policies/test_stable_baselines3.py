@@ -299,7 +299,17 @@ def test_weights_that_do_not_fit_are_named(tmp_path, name, how):
             r"cannot be shown what it says to see, \(3,\): mat1 and mat2 shapes",
         ),
         (data(COMMON, box(4)) | {"action_space": box(2)}, "are a Box. A decomposition has one row"),
-        (data(COMMON, box(4), actions=3), "has 2 outputs for 3 actions"),
+        (
+            data(COMMON, box(4))
+            | {
+                "action_space": {
+                    ":type:": "<class 'gymnasium.spaces.multi_discrete.MultiDiscrete'>",
+                    "nvec": "[7 7 7]",
+                }
+            },
+            "have 343 combinations. A decomposition has .* There may be 256 of them",
+        ),
+        (data(COMMON, box(4), actions=3), "has 2 outputs for 3 choices"),
         (
             data(COMMON, box(4), policy_kwargs={"activation_fn": "<class 'mine.Wave'>"}),
             "There is no activation 'Wave'",

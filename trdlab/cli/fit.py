@@ -119,6 +119,7 @@ def _fit(found: "Agent", out: Path, **how: Any) -> None:
     from trdlab.cli.progress import stopping
     from trdlab.explanations.calibration import claims
     from trdlab.runs import RunFolder
+    from trdlab.runs.folder import is_fit
     from trdlab.training.fitted import Stopped
 
     errors, began = common.errors(), time.monotonic()
@@ -126,10 +127,9 @@ def _fit(found: "Agent", out: Path, **how: Any) -> None:
         try:
             fitted = trdlab.fit(found, out=out, progress=True, should_stop=stop, **how)
         except Stopped as stopped:
-            errors.print(f"{stopped.cause} Saved.", soft_wrap=True, markup=False)
-            errors.print(
-                f"Go on: {RunFolder.open(out).resume_command}", soft_wrap=True, markup=False
-            )
+            kept = is_fit(out)
+            told = f"Saved. Go on: {RunFolder.open(out).resume_command}" if kept else "Begin again."
+            errors.print(f"{stopped.cause} {told}", soft_wrap=True, markup=False)
             raise typer.Exit(stop.code or 0) from stopped
     errors.print(f"Kept: {out}", soft_wrap=True, markup=False)
     report = trdlab.calibrate(fitted)

@@ -36,8 +36,8 @@ def check_reset(env: Any, name: str) -> None:
             )
 
 
-def observation_of(env: Any, seed: int, name: str) -> Any:
-    """Begins an episode, and returns its first observation.
+def beginning_of(env: Any, seed: int, name: str) -> tuple[Any, Any]:
+    """Begins an episode, and returns its first observation and `info`.
 
     Raises:
         InputError: `reset` does not return an observation and `info`.
@@ -49,7 +49,7 @@ def observation_of(env: Any, seed: int, name: str) -> Any:
             f"{name}.reset() returns {found}.",
             "Return observation, info, as Gymnasium asks since 0.26.",
         )
-    return answer[0]
+    return answer
 
 
 def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool, Any]:

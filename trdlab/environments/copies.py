@@ -14,7 +14,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import seeding
 
-from trdlab.environments.answers import layers, observation_of, outcome_of
+from trdlab.environments.actions import possible
+from trdlab.environments.answers import beginning_of, layers, outcome_of
 from trdlab.environments.chance import Chance, generators, kept_luck, own_chance, renew
 
 Env = gym.Env[Any, Any]
@@ -40,7 +41,7 @@ class Past:
     """
 
     seed: int
-    actions: Sequence[int]
+    actions: Sequence[Any]
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Proof:
     shared_chance: bool = False
 
 
-def prove(make: Callable[[], Env], past: Past, more: Sequence[int]) -> Proof:
+def prove(make: Callable[[], Env], past: Past, more: Sequence[Any]) -> Proof:
     """Finds out how an environment can be copied, by trying it out on another one of its kind.
 
     That one is played as far as `past`, or `LEAST` steps if they are more. Its deep copy is stepped
@@ -115,13 +116,17 @@ def copied(env: Env, held: Sequence[Chance]) -> tuple[Env, list[Chance]]:
 
 def begun(env: Env, seed: int) -> bytes:
     """Begins an episode, and returns its first observation."""
-    return _told(observation_of(env, seed, _kind(env)))
+    return _told(beginning_of(env, seed, _kind(env))[0])
 
 
-def trace(env: Env, actions: Iterable[int]) -> list[tuple[bytes, bytes, bool, bool]]:
-    """Returns what follows actions: observations, rewards and ends, up to the first end."""
+def trace(env: Env, actions: Iterable[Any]) -> list[tuple[bytes, bytes, bool, bool]]:
+    """Returns what follows actions: observations, rewards and ends, up to the first end.
+
+    In place of an action that the environment forbids another is taken.
+    """
     went = []
-    for action in actions:
+    for wanted in actions:
+        action = possible(env, wanted)
         observation, reward, terminated, truncated, _ = outcome_of(env, action, _kind(env))
         went.append((_told(observation), _told(reward), terminated, truncated))
         if terminated or truncated:
@@ -137,7 +142,7 @@ def goes_on(env: Env, past: Past) -> bool:
     return not (went and any(went[-1][2:]))
 
 
-def _fault(env: Env, rest: Sequence[int]) -> str:
+def _fault(env: Env, rest: Sequence[Any]) -> str:
     """Returns why a deep copy of an environment is none; both are stepped."""
     try:
         copy, _ = copied(env, generators(env))
@@ -163,7 +168,7 @@ def _unlike(env: Env, copy: Env) -> str:
 
 
 def _same_every_time(
-    env: Env, seed: int, actions: Sequence[int], new: Callable[[], Env] | None
+    env: Env, seed: int, actions: Sequence[Any], new: Callable[[], Env] | None
 ) -> bool:
     """Returns whether copies with fresh chance do the same from the beginning of an episode on.
 
@@ -189,7 +194,7 @@ def _same_every_time(
     return all(went(number) == first for number in range(1, _COPIES))
 
 
-def _vary(env: Env, actions: Sequence[int]) -> bool:
+def _vary(env: Env, actions: Sequence[Any]) -> bool:
     """Returns whether episodes begin alike and differ, though no generator drew their beginning."""
     went: dict[bytes, list[Any]] = {}
     for seed in range(_EPISODES):

@@ -8,7 +8,8 @@ from typing import Any, Self
 import numpy as np
 
 from trdlab.arrays import BoolArray, IntArray
-from trdlab.environments.answers import observation_of, outcome_of
+from trdlab.environments.actions import Actions
+from trdlab.environments.answers import beginning_of, outcome_of
 from trdlab.environments.aside import aside
 from trdlab.environments.chance import generators, kept_luck, own_chance, renew
 from trdlab.environments.copies import (
@@ -26,7 +27,7 @@ from trdlab.environments.history import Histories, checked_actions
 from trdlab.environments.naming import action_names
 from trdlab.environments.protocol import Frames, NotCopyable, Padding, Step
 from trdlab.environments.sources import EnvSource, Source
-from trdlab.environments.spaces import discrete_actions, frame_space, is_image
+from trdlab.environments.spaces import frame_space, is_image
 from trdlab.errors import InputError
 
 
@@ -47,7 +48,7 @@ class GymEnvironments:
         env_arguments: what to make those of an id with.
 
     Raises:
-        InputError: the environment cannot be made, its actions are not discrete, or no network
+        InputError: the environment cannot be made, its actions cannot be counted, or no network
             reads its observations.
         NotParallel: one can be made, and not B beside each other.
 
@@ -80,6 +81,7 @@ class GymEnvironments:
         except InputError:
             self.close()
             raise
+        self.allowed: BoolArray | None = None
         self.shared_chance, self._is_copy = False, False
         self._infos: dict[int, Any] = {}
         self._proof: Proof | None = None
@@ -167,6 +169,7 @@ class GymEnvironments:
                 renew(chance, own)
         copies = self._with([twin for twin, _ in found], seed)
         copies.shared_chance = self._proof.shared_chance
+        copies.allowed = None if self.allowed is None else self.allowed[which]
         return copies
 
     @aside()
@@ -177,10 +180,9 @@ class GymEnvironments:
 
     def _look_at(self, env: Any) -> None:
         """Notes what can be seen and done in an environment."""
-        actions = discrete_actions(env.action_space, self.name)
-        self.num_actions, self.first_action = int(actions.n), int(actions.start)
-        self._called = [actions.start + i for i in range(self.num_actions)]  # np.int64, as drawn
-        self.action_names = action_names(env, self.num_actions, self.first_action)
+        self._actions = Actions.of(env.action_space, self.name)
+        self.num_actions, self.first_action = len(self._actions), self._actions.first
+        self.action_names = action_names(env, self._actions.sizes, self.first_action)
         self._space = env.observation_space
         self.observation_space = frame_space(self._space, self.name)
         whole = getattr(self.observation_space, "whole", None)
@@ -195,7 +197,7 @@ class GymEnvironments:
         """Returns what others of this kind show about copies of an environment."""
         seed, past = self._histories.past(env)
         more = np.random.default_rng(0).integers(self.num_actions, size=LEAST + COMPARED)
-        actions = list(self.first_action + np.concatenate([past, more]))
+        actions = [self._actions.called[action] for action in (*past, *more)]
         try:
             return prove(
                 lambda: self._source.make(1, beside=self._envs)[0],
@@ -242,6 +244,7 @@ class GymEnvironments:
         other._envs, other.num_envs, other._is_copy = envs, len(envs), True
         other._infos = {}
         other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
+        other.allowed = None
         return other
 
     def _begin(self, env: int, frames: Frames, seeding: int | None = None) -> None:
@@ -249,7 +252,8 @@ class GymEnvironments:
         self._reset(env, frames, self._histories.begin(env, seeding))
 
     def _reset(self, env: int, frames: Frames, seed: int) -> None:
-        frame = self._frame(observation_of(self._envs[env], seed, self.name))
+        observation, info = beginning_of(self._envs[env], seed, self.name)
+        frame = self._frame(observation)
         if not np.can_cast(frame.dtype, frames.dtype, "same_kind"):
             raise InputError(
                 f"{self.name} gives observations of type {frame.dtype}, and its observation "
@@ -257,13 +261,18 @@ class GymEnvironments:
                 "One of the two is wrong.",
             )
         frames[env] = frame
+        self._allow(env, info)
         self._histories.record_reset(env, frames)
 
     def _act(self, env: int, action: int, step: Step) -> None:
         """Takes one environment's action, and fills its row of `step`."""
-        observation, step.rewards[env], terminated, truncated, self._infos[env] = outcome_of(
-            self._envs[env], self._called[action], self.name
+        observation, step.rewards[env], terminated, truncated, info = outcome_of(
+            self._envs[env], self._actions.called[action], self.name
         )
+        self._infos[env] = info
+        self._allow(env, info, terminated)
+        if step.allowed is not None and self.allowed is not None:
+            step.allowed[env] = self.allowed[env]
         step.frames[env] = self._frame(observation)
         step.terminated[env] = terminated
         step.truncated[env] = truncated and not terminated
@@ -272,6 +281,17 @@ class GymEnvironments:
             self._begin(env, step.following)
         else:
             step.following[env] = step.frames[env]
+
+    def _allow(self, env: int, info: Any, is_over: bool = False) -> None:
+        """Notes which actions can be taken next; once it is over, that does not matter."""
+        mask = self._actions.allowed(self._envs[env], info, self.name)
+        if mask is None and self.allowed is None:
+            return
+        if self.allowed is None:
+            self.allowed = np.ones((self.num_envs, self.num_actions), dtype=np.bool_)
+        self.allowed[env] = True if mask is None or is_over else mask
+        if not self.allowed[env].any():
+            raise InputError(f"{self.name} forbids every action.", "Leave at least one.")
 
     def _frame(self, observation: Any) -> Frames:
         if isinstance(self.observation_space, FlatSpace):
@@ -308,5 +328,6 @@ class GymEnvironments:
             truncated=np.zeros(each, dtype=np.bool_),
             life_lost=np.zeros(each, dtype=np.bool_),
             following=self._blank_frames(),
+            allowed=None if self.allowed is None else np.ones_like(self.allowed),
             info=lambda env: self._infos.get(env) or {},
         )

@@ -12,6 +12,8 @@ from trdlab.environments.protocol import Environments
 from trdlab.environments.stack import observation_space
 from trdlab.errors import InputError
 
+_MANY, _FEW = 20, 8  # actions that are named in a sentence, and of more than those
+
 
 @dataclass(frozen=True, eq=False)
 class Interface:
@@ -59,7 +61,10 @@ class Interface:
     def done(self) -> str:
         """What can be done, in words."""
         names, count = self.action_names, len(self.action_names)
-        return f"{count} actions" + ("" if is_numbered(names) else f" ({', '.join(names)})")
+        if is_numbered(names):
+            return f"{count} actions"
+        shown = names if count <= _MANY else (*names[:_FEW], "…", names[-1])
+        return f"{count} actions ({', '.join(shown)})"
 
     def unlike(self, other: "Interface") -> tuple[str, str] | None:
         """Returns the words for what differs between the two, None where all is the same.

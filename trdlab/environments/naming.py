@@ -1,10 +1,11 @@
 """What actions are called, in one place."""
 
 from collections.abc import Sequence
+from itertools import product
+from math import prod
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 
 def numbered(num_actions: int, first: int = 0) -> tuple[str, ...]:
@@ -26,20 +27,32 @@ def is_numbered(names: Sequence[str]) -> bool:
     return first.isdecimal() and tuple(names) == numbered(len(names), int(first))
 
 
-def action_names(env: Any, num_actions: int, first: int = 0) -> tuple[str, ...]:
+def action_names(env: Any, sizes: Sequence[int], first: int = 0) -> tuple[str, ...]:
     """Returns A names: what an environment calls its actions, or else their numbers.
 
     It tells them in `action_names` or, as Atari games do, by `get_action_meanings()`. Names that
-    are too few, too many, or not all different count as none.
+    are too few, too many, or not all different count as none. Where actions have several parts it
+    may also tell the names of each part's choices, a list for each: an action is called by all of
+    them, such as "left+jump"; without names by their numbers.
 
     Args:
         env: a Gymnasium environment; what is asked is `env.unwrapped`.
-        num_actions: A.
+        sizes: how many choices each part of an action has; A is their product.
         first: what the environment itself calls action 0.
     """
     base = getattr(env, "unwrapped", env)
-    names: npt.ArrayLike = getattr(base, "action_names", ())
+    names: Any = getattr(base, "action_names", ())
     if hasattr(base, "get_action_meanings"):
         names = base.get_action_meanings()
-    told = tuple(str(name) for name in np.asarray(names).ravel())
-    return told if len(set(told)) == len(told) == num_actions else numbered(num_actions, first)
+    if len(sizes) > 1 and [np.size(part) for part in names] == list(sizes):
+        names = list(map(_joined, product(*names)))
+    told = tuple(str(name) for name in np.asarray(names, dtype=object).ravel())
+    if len(set(told)) == len(told) == prod(sizes):
+        return told
+    if len(sizes) == 1:
+        return numbered(sizes[0], first)
+    return tuple(f"action {_joined(place)}" for place in product(*map(range, sizes)))
+
+
+def _joined(parts: Sequence[Any]) -> str:
+    return "+".join(map(str, parts))

@@ -115,7 +115,7 @@ class Outcomes:
         for name, what in self._given.items():
             if isinstance(what, str) and what not in self._seen:
                 known = sorted(self._seen)
-                cure = closest(what, known) if known else "The environment told nothing in `info`."
+                cure = closest(what, known) if known else "Its environment told nothing else."
                 raise InputError(f"The outcome '{name}' is {what}, and no step had that.", cure)
 
     def _number(self, name: str, what: Outcome | str, transition: Transition) -> float:

@@ -45,6 +45,7 @@ class Step:
         life_lost: `[B]`, whether a life was lost and the episode goes on.
         following: `[B, ...]`, the frame that the next action is chosen at: that of `frames`, or
             the first one of the next episode where one ended.
+        allowed: `[B, A]`, which actions could be taken at `frames`; None where all can always be.
         info: from an environment's number to what else it tells of the step, for as long as no
             other step has been taken.
     """
@@ -55,6 +56,7 @@ class Step:
     truncated: BoolArray
     life_lost: BoolArray
     following: Frames
+    allowed: BoolArray | None = None
     info: Callable[[int], Mapping[str, Any]] = _no_info
 
     @property
@@ -121,6 +123,16 @@ class Environments(Protocol):
     def close(self) -> None:
         """Lets go of what the environments hold."""
         ...
+
+
+class MaskedEnvironments(Environments, Protocol):
+    """Environments in which some actions cannot be taken at times.
+
+    Attributes:
+        allowed: `[B, A]`, which can be taken now; None where all can, as far as was ever told.
+    """
+
+    allowed: BoolArray | None
 
 
 class CopyableEnvironments(Environments, Protocol):

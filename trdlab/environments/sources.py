@@ -8,13 +8,13 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.envs.registration import EnvSpec
 
+from trdlab.environments.actions import Actions
 from trdlab.environments.answers import check_reset
 from trdlab.environments.aside import aside
 from trdlab.environments.chance import kept_luck
 from trdlab.environments.copies import Env, begun, trace
 from trdlab.environments.making import make_environment
 from trdlab.environments.protocol import NotParallel
-from trdlab.environments.spaces import discrete_actions
 from trdlab.errors import InputError
 
 EnvSource = str | EnvSpec | Env | Callable[[], Env]
@@ -180,8 +180,8 @@ def _way_of_copying(env: Env) -> Callable[[], Env]:
 
 def _do_the_same(env: Env, other: Env) -> bool:
     """Returns whether two environments do the same from the same seed on, or cannot be compared."""
-    space = discrete_actions(env.action_space, name_of(env))
-    actions = [int(space.start) + i % int(space.n) for i in range(_STEPS)]
+    called = Actions.of(env.action_space, name_of(env)).called
+    actions = [called[i % len(called)] for i in range(_STEPS)]
 
     def played(which: Env) -> list[Any]:
         return [begun(which, seed=0), *trace(which, actions)]

@@ -63,19 +63,5 @@ def is_image(space: gym.Space[Any]) -> TypeGuard[gym.spaces.Box]:
     return full and len(space.shape) in (2, 3)
 
 
-def discrete_actions(space: gym.Space[Any], name: str) -> gym.spaces.Discrete:
-    """Returns the space of actions.
-
-    Raises:
-        InputError: they are not discrete.
-    """
-    if not isinstance(space, gym.spaces.Discrete):
-        raise InputError(
-            f"The action space of {name} is {_say(space)}.",
-            "A decomposition has one row per action: use an environment with a Discrete one.",
-        )
-    return space
-
-
 def _say(space: gym.Space[Any]) -> str:
     return " ".join(str(space).split())  # arrays of bounds have lines

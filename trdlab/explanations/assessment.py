@@ -170,20 +170,26 @@ def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:
 
 
 def moment_of_play(agent: Agent, playing: Playing) -> Moment:
-    """Returns what the agent expects where the first of its episodes stands."""
+    """Returns what the agent expects where the first of its episodes stands.
+
+    Of actions that the environment forbids there nothing is told.
+    """
     if agent.world is not None and isinstance(agent.estimator, ExactTable) and not agent.is_away:
         return exact_moment(agent.world, agent.estimator, int(playing.stack.observations[0]))
-    decision = playing.decide()
+    decision, names = playing.decide(), np.array(agent.action_names)
+    allowed = slice(None) if playing.allowed is None else playing.allowed[0]  # [A]
     # findings compare sums, and float32 sums differ in order
-    components = decision.decomposition.components[0].astype(np.float64)  # [A, N+1]
+    components = decision.decomposition.components[0, allowed].astype(np.float64)  # [A, N+1]
+    own = tuple(names[allowed].tolist())
     seen = playing.stack.observations[playing.running][:1]  # [1, ...]
     outlook = agent.estimator.outlook(seen) if hasattr(agent.estimator, "outlook") else None
     return Moment(
         RewardDecomposition(components, agent.estimator.time_axis),
-        agent.action_names,
+        own,
         agent.estimator.future,
-        policy=decision.probabilities[0].astype(np.float64),
-        outlook=None if outlook is None else outlook[0],
+        policy=decision.probabilities[0, allowed].astype(np.float64),
+        forbidden=tuple(name for name in agent.action_names if name not in own),
+        outlook=None if outlook is None else outlook[0, allowed],
         seconds_per_step=agent.seconds_per_step,
     )
 

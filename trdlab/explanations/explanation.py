@@ -88,15 +88,16 @@ class Explanation(Printable):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """All that was asked for, or all there is, by the question that it answers."""
+        episode = () if self.story is None else self.story.claims
         told = [
             *([] if self.choice is None else telling.sections(self.choice)),
             *([] if self.trial is None else outcome.sections(self.trial)),
-            *([] if self.story is None else [self.story.section(self.seed)]),
+            Section("episode", f"The episode with seed {self.seed}", episode),
             *([] if self.report is None else calibration.sections(self.report)),
+            Section("missing", "What is not known", notes=self.missing),
         ]
         wanted = [name for part in self.parts or PARTS for name in _OF_PART[part]]
-        missing = Section("missing", "What is not known", notes=self.missing)
-        return tuple(part for part in told if part.name in wanted) + (missing,) * bool(missing)
+        return tuple(part for part in told if part and part.name in (*wanted, "missing"))
 
 
 def parse_parts(text: str | None) -> tuple[Part, ...]:

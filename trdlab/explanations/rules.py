@@ -154,16 +154,12 @@ class Language(Generic[E]):
 
     def true(self, sentence: str, evidence: E) -> Claim | None:
         """Returns the claim that a sentence makes, if it is one of these rules' and true."""
-        for rule in self.rules.values():
-            if _skeleton(rule.says).fullmatch(sentence):
-                for claim in rule(evidence):
-                    if claim.sentence == sentence:
-                        return claim
-        return None
+        made = every(evidence, *self.like(sentence))
+        return next((claim for claim in made if claim.sentence == sentence), None)
 
-    def knows(self, sentence: str) -> bool:
-        """Returns whether a sentence looks like one of these rules'."""
-        return any(_skeleton(rule.says).fullmatch(sentence) for rule in self.rules.values())
+    def like(self, sentence: str) -> list[Rule[E]]:
+        """Returns the rules of which a sentence could be one."""
+        return [of for of in self.rules.values() if _skeleton(of.says).fullmatch(sentence)]
 
 
 def check(text: str, known: Sequence[tuple[Language[Any], Any]]) -> list[Claim]:
@@ -184,7 +180,7 @@ def _checked(piece: str, known: Sequence[tuple[Language[Any], Any]]) -> Claim:
         if (claim := language.true(piece, evidence)) is not None:
             return claim
     about = " and ".join(language.about for language, _ in known)
-    is_known = any(language.knows(piece) for language, _ in known)
+    is_known = any(language.like(piece) for language, _ in known)
     verdict = "is not true of" if is_known else "is no statement about"
     raise UnsupportedSentenceError(f"The sentence '{piece}' {verdict} {about}.")
 

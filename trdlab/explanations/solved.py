@@ -1,7 +1,6 @@
 """One state of a solved world: its exact table, and the choice that is explained there."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +10,7 @@ from trdlab.explanations.moment.moment import Choice
 from trdlab.gridworld import Gridworld
 from trdlab.printable import Printable
 from trdlab.tabular import ExactTable, Ties, exact
-
-if TYPE_CHECKING:
-    from trdlab.tabular.named import TabularWorld
+from trdlab.tabular.named import TabularWorld
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,7 +24,7 @@ class SolvedState(Printable):
         choice: an action and the one it is held against.
     """
 
-    world: "Gridworld | TabularWorld"
+    world: Gridworld | TabularWorld
     table: ExactTable
     state: int
     choice: Choice
@@ -44,7 +41,7 @@ class SolvedState(Printable):
 
 
 def solve_state(
-    world: "Gridworld | TabularWorld",
+    world: Gridworld | TabularWorld,
     time_axis: TimeAxis,
     *,
     state: str | None = None,

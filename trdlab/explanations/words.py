@@ -2,14 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING
 
 from trdlab.explanations.rules import Form
 from trdlab.formatting import chance_of, likely, percent, plain, said, signed
+from trdlab.statistics import Estimate
 from trdlab.time_axis import TimeAxis
-
-if TYPE_CHECKING:
-    from trdlab.statistics import Estimate
 
 
 @cache
@@ -155,7 +152,7 @@ def _does(value: float, digits: int, gives: str, costs: str = "costs") -> str:
     return f"{gives if value > 0.0 else costs} {said(abs(value), digits)}"
 
 
-def _estimate(of: "Estimate", digits: int) -> str:
+def _estimate(of: Estimate, digits: int) -> str:
     if not of.low < of.high:  # where there is no chance, or no interval
         return said(of.value, digits)
     return f"{said(of.value, digits)} ({said(of.low, digits)} to {said(of.high, digits)})"

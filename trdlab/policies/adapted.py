@@ -1,6 +1,6 @@
 """What all agents of other libraries become here: a policy, and what is known about it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from math import prod
 from typing import Any, Self
@@ -12,6 +12,13 @@ from trdlab.arrays import BoolArray, FloatArray
 from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.policies.ready import greedy
+
+NEAREST = (
+    "A decomposition has one row per action. Let the environment take a few by their numbers "
+    "(gymnasium.wrappers.TransformAction), and give trdlab.agent a function from an observation to "
+    "the number that comes nearest to what the agent would do."
+)
+"""What to do about an agent whose actions cannot be counted."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +125,13 @@ class Valuing:
 
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns 1 for that action `[B, A]`; there is nothing to remember."""
-        return greedy(self.q_values(observations)), None
+        return self.act_within(observations, state, begins, None)
+
+    def act_within(
+        self, observations: Any, state: Any, begins: BoolArray, allowed: BoolArray | None
+    ) -> tuple[FloatArray, Any]:
+        """Returns the same, of the actions that are `allowed [B, A]`."""
+        return greedy(self.q_values(observations), allowed), None
 
     def q_values(self, observations: Any) -> FloatArray:
         """Returns the value of each action `[B, A]`.
@@ -167,6 +180,22 @@ class Drawing:
         """Returns the probabilities `[B, A]`, and what to remember."""
         logits, state = self.scores(observations, state, begins)
         return softmax(logits), state
+
+
+def combined(parts: Sequence[FloatArray]) -> FloatArray:
+    """Returns the logits of all combinations of choices `[B, A]`, the last part's fastest.
+
+    Args:
+        parts: the logits of the choices of each part, `[B, n]`.
+
+    >>> told = softmax(combined([np.log([[0.3, 0.7]]), np.log([[0.5, 0.5]])]))
+    >>> told.round(2).tolist()
+    [[0.15, 0.15, 0.35, 0.35]]
+    """
+    first, *others = parts
+    for other in others:
+        first = (first[:, :, None] + other[:, None]).reshape(len(first), -1)
+    return first
 
 
 def softmax(logits: FloatArray) -> FloatArray:

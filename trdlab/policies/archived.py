@@ -33,6 +33,18 @@ def states(space: Any) -> int:
     return int(said) if said.isdecimal() and len(said) < 10 else 0
 
 
+def choices(space: Any) -> Shape:
+    """Returns how many choices each part of an action has; () where none are said.
+
+    >>> kind = {":type:": "<class 'gymnasium.spaces.multi_discrete.MultiDiscrete'>"}
+    >>> choices(kind | {"nvec": "[2 3]"})
+    (2, 3)
+    """
+    if isinstance(space, dict) and kind(space, "MultiDiscrete"):
+        return _numbers(space.get("nvec", ""))
+    return (states(space),) if states(space) else ()
+
+
 def parts(space: Any) -> dict[str, Shape]:
     """Returns the shapes of the parts of a Dict by name, in order; of one of n numbers `(n,)`.
 

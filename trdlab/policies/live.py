@@ -8,10 +8,11 @@ import numpy as np
 import torch
 
 from trdlab.arrays import BoolArray, FloatArray
+from trdlab.environments.actions import Actions
 from trdlab.environments.flat import FlatSpace
 from trdlab.environments.spaces import frame_space
 from trdlab.errors import InputError
-from trdlab.policies.adapted import About, Drawing, Valuing
+from trdlab.policies.adapted import NEAREST, About, Drawing, Valuing, combined
 from trdlab.policies.networks import sizes
 
 
@@ -30,12 +31,11 @@ def adapt(model: Any) -> Drawing | Valuing | None:
     if policy is None or not hasattr(model, "predict") or not hasattr(policy, "obs_to_tensor"):
         return None
     kind = type(model).__name__
-    space, actions = model.observation_space, model.action_space
-    if not hasattr(actions, "n"):
-        raise InputError(
-            f"The actions of this {kind} are {actions}.",
-            "A decomposition has one row per action: they must be Discrete.",
-        )
+    space = model.observation_space
+    try:
+        actions = Actions.of(model.action_space, f"this {kind}")
+    except InputError as error:
+        raise InputError(error.cause, NEAREST) from error
     values = next((of for of in ("q_net", "quantile_net") if hasattr(policy, of)), None)
     if values is None and not hasattr(policy, "get_distribution"):
         raise InputError(
@@ -50,7 +50,7 @@ def adapt(model: Any) -> Drawing | Valuing | None:
         {"stable_baselines3": "Stable-Baselines3"}.get(library, library.replace("_", "-")),
         str(getattr(import_module(library), "__version__", "")),
         (int(seen.n),) if isinstance(seen, gym.spaces.Discrete) else tuple(seen.shape or ()),
-        int(actions.n),
+        len(actions),
         layers=_layers(policy, values),
         activation=getattr(getattr(policy, "activation_fn", None), "__name__", ""),
         memory=2 * memory.num_layers * memory.hidden_size if memory else 0,
@@ -106,7 +106,7 @@ class _Asked:
         """Returns the logits of each action `[B, A]`, and nothing to remember."""
         with torch.no_grad():
             told = self._policy.get_distribution(self._seen(observations))
-        return _array(told.distribution.logits), None
+        return _logits(told), None
 
     def remembering(
         self, observations: Any, state: Any, begins: BoolArray
@@ -122,9 +122,7 @@ class _Asked:
         starts = torch.as_tensor(begins, dtype=torch.float32, device=policy.device)
         with torch.no_grad():
             told, then = policy.get_distribution(self._seen(observations), now, starts)
-        return _array(told.distribution.logits), tuple(
-            _array(part.transpose(0, 1)) for part in then
-        )
+        return _logits(told), tuple(_array(part.transpose(0, 1)) for part in then)
 
     def _seen(self, observations: Any) -> Any:
         """Returns observations as the policy takes them."""
@@ -133,6 +131,12 @@ class _Asked:
         if self._normalise is not None:
             observations = self._normalise.normalize_obs(observations)
         return self._policy.obs_to_tensor(observations)[0]
+
+
+def _logits(told: Any) -> FloatArray:
+    """Returns the logits of a distribution `[B, A]`; those of several parts are in a list."""
+    of = getattr(told, "distributions", None) or told.distribution
+    return combined([_array(part.logits) for part in (of if isinstance(of, list) else [of])])
 
 
 def _array(tensor: torch.Tensor) -> FloatArray:

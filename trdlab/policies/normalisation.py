@@ -7,6 +7,7 @@ arrays: nothing of it is executed, and what is no part of such a file is refused
 import io
 import pickle
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ import numpy.typing as npt
 
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
+
+Shape = tuple[int, ...]
 
 _LARGEST = 100_000_000  # bytes; such files have some thousands
 _ARRAYS = {  # what arrays and numbers of numpy are made of
@@ -36,12 +39,12 @@ class Normalisation:
     Args:
         means: `[...]`, of each number.
         deviations: `[...]`, likewise.
-        clip: how far from 0 they may then be.
+        clip: `[...]`, how far from 0 each may then be.
     """
 
     means: FloatArray
     deviations: FloatArray
-    clip: float
+    clip: FloatArray
 
     def __call__(self, observations: Any) -> FloatArray:
         """Returns observations `[B, ...]` as the agent saw them."""
@@ -49,12 +52,15 @@ class Normalisation:
         return np.asarray(np.clip(apart, -self.clip, self.clip), dtype=np.float32)
 
 
-def read_normalisation(path: Path, seen: tuple[int, ...] | None) -> Normalisation | None:
+def read_normalisation(
+    path: Path, seen: Shape | None, parts: Mapping[str, Shape]
+) -> Normalisation | None:
     """Returns the statistics in a file that `VecNormalize.save` wrote; None if it changes nothing.
 
     Args:
         path: of the file.
         seen: the shape of an observation.
+        parts: the shapes of its parts, where it has several; some may be left alone.
 
     Raises:
         InputError: it is no such file, holds code, or is of other observations.
@@ -62,7 +68,32 @@ def read_normalisation(path: Path, seen: tuple[int, ...] | None) -> Normalisatio
     held = vars(_read(path))
     if not held.get("norm_obs", True):
         return None
-    of = vars(held["obs_rms"]) if isinstance(held.get("obs_rms"), _Inert) else {}
+    statistics = held.get("obs_rms")
+    if not parts:
+        return _normalisation(path, held, statistics, seen)
+    if not isinstance(statistics, dict) or not set(statistics) <= set(parts):
+        named = sorted(map(str, statistics)) if isinstance(statistics, dict) else "one thing"
+        raise InputError(
+            f"'{path}' is of {named}, and the agent sees {list(parts)}.",
+            "Name the one that was saved with this agent.",
+        )
+    each = [
+        _normalisation(path, held, statistics[name], shape)
+        if name in statistics
+        else Normalisation(np.zeros(shape), np.ones(shape), np.full(shape, np.inf))
+        for name, shape in parts.items()
+    ]
+    fields = ("means", "deviations", "clip")
+    return Normalisation(
+        *(np.concatenate([getattr(of, name).ravel() for of in each]) for name in fields)
+    )
+
+
+def _normalisation(
+    path: Path, held: Mapping[str, Any], statistics: Any, seen: Shape | None
+) -> Normalisation:
+    """Returns what one kind of observation, of the shape `seen`, goes through."""
+    of = vars(statistics) if isinstance(statistics, _Inert) else {}
     try:
         means, variances = (_floats(of[name]) for name in ("mean", "var"))
         clip, epsilon = float(held["clip_obs"]), float(held["epsilon"])
@@ -75,13 +106,18 @@ def read_normalisation(path: Path, seen: tuple[int, ...] | None) -> Normalisatio
             f"'{path}' is of observations of shape {means.shape}, and the agent sees {seen}.",
             "Name the one that was saved with this agent.",
         )
-    return Normalisation(means, np.sqrt(variances + epsilon), clip)
+    return Normalisation(means, np.sqrt(variances + epsilon), np.full(means.shape, clip))
 
 
 class _Inert:
     """Stands for an object of another library: holds what is said of it, and does nothing."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None: ...
+
+    def __setitem__(self, key: Any, value: Any) -> None: ...
+
+    def append(self, item: Any) -> None:
+        """Does nothing, where a file fills a list of another kind."""
 
     def __setstate__(self, state: Any) -> None:
         parts = state if isinstance(state, tuple) else (state,)

@@ -19,6 +19,10 @@ class Policy(Protocol):
     given back at the next step, so that states of an environment can be copied with the memory of
     who acts in them.
 
+    Where the environment forbids actions, the chances of these become 0, and those of the others
+    grow alike. A policy that would rather know has a method `act_within`, which is asked in place
+    of `act` there and takes one argument more: `allowed [B, A]`.
+
     `state` is None, an array `[B, ...]`, or a dict, list or tuple of those. The rows of episodes
     that have ended are taken out of it, and those of copies are repeated (see `rows`).
     """
@@ -48,7 +52,11 @@ def rows(state: Any, which: IntArray | BoolArray | int) -> Any:
 
 
 def ask(
-    policy: Policy, observations: Any, state: Any = None, begins: BoolArray | None = None
+    policy: Policy,
+    observations: Any,
+    state: Any = None,
+    begins: BoolArray | None = None,
+    allowed: BoolArray | None = None,
 ) -> tuple[FloatArray, Any]:
     """Returns how likely a policy takes each action `[B, A]`, checked, and what it remembers.
 
@@ -57,13 +65,19 @@ def ask(
         observations: `[B, ...]`.
         state: see `Policy`.
         begins: `[B]`; by default episodes begin everywhere.
+        allowed: `[B, A]`, which actions can be taken; by default all.
 
     Raises:
-        InputError: the answer is no distribution over actions for each observation.
+        InputError: the answer is no distribution over actions for each observation, or leaves none
+            that can be taken.
     """
     count = len(observations)
     begins = np.ones(count, dtype=np.bool_) if begins is None else begins
-    told, state = policy.act(observations, state, begins)
+    within = getattr(policy, "act_within", None)
+    if allowed is not None and within is not None:
+        told, state = within(observations, state, begins, allowed)
+    else:
+        told, state = policy.act(observations, state, begins)
     probabilities = np.asarray(told)
     if probabilities.ndim != 2 or len(probabilities) != count:
         raise InputError(
@@ -78,4 +92,21 @@ def ask(
             f"{probabilities[row].tolist()}.",
             "It must be probabilities that sum to 1.",
         )
-    return probabilities, state
+    return (probabilities if allowed is None else _within(probabilities, allowed)), state
+
+
+def _within(probabilities: FloatArray, allowed: BoolArray) -> FloatArray:
+    """Returns `[B, A]`: 0 for what cannot be taken, and the rest grown to sum to 1."""
+    if probabilities.shape != allowed.shape:
+        return probabilities  # whoever knows the actions says what is wrong
+    left = np.where(allowed, probabilities, 0.0)
+    total = left.sum(axis=1, keepdims=True)  # [B, 1]
+    if not total.all():
+        row = int(np.argmin(total))
+        raise InputError(
+            f"The policy's answer to observation {row} of {len(left)} leaves no action that the "
+            f"environment allows: it gives {probabilities[row].tolist()}, allowed are the actions "
+            f"{np.flatnonzero(allowed[row]).tolist()}.",
+            "Give it a method act_within, which is told what is allowed.",
+        )
+    return np.where(allowed.all(axis=1, keepdims=True), probabilities, left / total)

@@ -15,16 +15,18 @@ Who = Policy | Estimator | Callable[[Any], FloatArray]
 """Who can act: by itself, greedily, or by a function to action probabilities."""
 
 
-def greedy(value: FloatArray) -> FloatArray:
+def greedy(value: FloatArray, allowed: BoolArray | None = None) -> FloatArray:
     """Returns probabilities `[B, A]`: 1 for the action of largest value, of equals for the first.
 
     Args:
         value: `[B, A]`.
+        allowed: `[B, A]`, which actions can be taken; None where all can.
 
     >>> greedy(np.array([[1.0, 3.0, 3.0]])).tolist()
     [[0.0, 1.0, 0.0]]
     """
-    best = value.argmax(axis=1)[:, None] == np.arange(value.shape[1])
+    possible = value if allowed is None else np.where(allowed, value, -np.inf)
+    best = possible.argmax(axis=1)[:, None] == np.arange(value.shape[1])
     return np.asarray(best.astype(value.dtype))
 
 
@@ -40,7 +42,13 @@ class Greedy:
 
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns the probabilities `[B, A]`; there is nothing to remember."""
-        return greedy(self.estimator.decompose(observations).value), None
+        return self.act_within(observations, state, begins, None)
+
+    def act_within(
+        self, observations: Any, state: Any, begins: BoolArray, allowed: BoolArray | None
+    ) -> tuple[FloatArray, Any]:
+        """Returns the same, of the actions that are `allowed [B, A]`."""
+        return greedy(self.estimator.decompose(observations).value, allowed), None
 
 
 @dataclass(frozen=True)
@@ -83,6 +91,14 @@ class EpsilonGreedy:
         evenly = self.epsilon / probabilities.shape[1]
         return (1.0 - self.epsilon) * probabilities + evenly, state
 
+    def act_within(
+        self, observations: Any, state: Any, begins: BoolArray, allowed: BoolArray
+    ) -> tuple[FloatArray, Any]:
+        """Returns the same, of the actions that are `allowed [B, A]`."""
+        probabilities, state = ask(self.policy, observations, state, begins, allowed)
+        evenly = self.epsilon * allowed / allowed.sum(axis=1, keepdims=True)
+        return (1.0 - self.epsilon) * probabilities + evenly, state
+
 
 @dataclass(frozen=True)
 class Likeliest:
@@ -107,7 +123,13 @@ class Likeliest:
 
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns 1 for that action `[B, A]`, and what the other policy remembers."""
-        probabilities, state = ask(self.policy, observations, state, begins)
+        return self.act_within(observations, state, begins, None)
+
+    def act_within(
+        self, observations: Any, state: Any, begins: BoolArray, allowed: BoolArray | None
+    ) -> tuple[FloatArray, Any]:
+        """Returns the same, of the actions that are `allowed [B, A]`."""
+        probabilities, state = ask(self.policy, observations, state, begins, allowed)
         return greedy(probabilities), state
 
 

@@ -78,6 +78,6 @@ def _acting(found: Drawing | Valuing, options: Options, path: Path) -> Policy:
             "Leave out greedy.",
         )
     if options.normalize is not None:
-        change = read_normalisation(Path(options.normalize), found.about.seen)
+        change = read_normalisation(Path(options.normalize), found.about.seen, found.about.parts)
         found = found if change is None else found.seeing(change)
     return Likeliest(found) if options.greedy and isinstance(found, Drawing) else found

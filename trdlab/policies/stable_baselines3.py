@@ -1,8 +1,8 @@
 """Agents in the archives of Stable-Baselines3 and sb3-contrib; neither has to be installed.
 
 Only tensors and plain JSON are read: what an archive holds as pickles stays unread. Layers and
-their sizes follow from the tensors. The formats are those of versions 1.0 to 2.9. MaskablePPO acts
-without its masks, which are the environment's: it may draw an action that it never could.
+their sizes follow from the tensors. The formats are those of versions 1.0 to 2.9. The masks of
+MaskablePPO are the environment's, and are no part of the archive.
 """
 
 import re
@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from torch import nn
 
-from trdlab.arrays import FloatArray
+from trdlab.arrays import BoolArray, FloatArray
+from trdlab.environments.actions import MOST
 from trdlab.errors import InputError
 from trdlab.policies import archived
-from trdlab.policies.adapted import About, Drawing, Valuing
+from trdlab.policies.adapted import NEAREST, About, Drawing, Scores, Valuing, combined
 from trdlab.policies.files import AgentFile, Options
 from trdlab.policies.networks import (
     Combined,
@@ -128,10 +129,13 @@ class _Saved:
                 _GIVE_MODEL,
             )
         done = self.data.get("action_space")
-        if kind := archived.kind(done, "Box", "MultiDiscrete", "MultiBinary"):
+        if kind := archived.kind(done, "Box", "MultiBinary"):
+            raise InputError(f"The actions of the agent in '{path}' are a {kind}.", NEAREST)
+        if prod(archived.choices(done)) > MOST:
             raise InputError(
-                f"The actions of the agent in '{path}' are a {kind}.",
-                "A decomposition has one row per action: they must be Discrete.",
+                f"The actions of the agent in '{path}' have {prod(archived.choices(done)):,} "
+                "combinations.",
+                f"{NEAREST} There may be {MOST} of them.",
             )
         if strange := [name for name in self.weights if not known.fullmatch(name)]:
             raise InputError(
@@ -192,13 +196,18 @@ class _Saved:
         """The shapes of what is seen by name, where that is a Dict."""
         return archived.parts(self.data.get("observation_space"))
 
+    @property
+    def choices(self) -> tuple[int, ...]:
+        """How many choices each part of an action has, if that is said."""
+        return archived.choices(self.data.get("action_space"))
+
 
 def _valuing(saved: _Saved, options: Options) -> Valuing:
     """Returns the agent of DQN or QR-DQN."""
     between, of = saved.activation(options), saved.values
     before, seen, divisor = saved.features(f"{of}.features_extractor.")
     head = dense(saved.weights, numbered(saved.weights, f"{of}.{of}."), between)
-    (_, outputs), actions = flow(head), _actions(saved.data)
+    (_, outputs), actions = flow(head), sum(saved.choices)
     quantiles = outputs // actions if of == "quantile_net" and actions else 1
     count = outputs // quantiles
     _check_actions(saved, count)
@@ -225,13 +234,14 @@ def _drawing(saved: _Saved, options: Options) -> Drawing:
     hidden = dense(weights, numbered(weights, "mlp_extractor.policy_net."), between, ends=True)
     last = dense(weights, ["action_net"], between)
     after = nn.Sequential(*hidden, *last)
-    _, count = flow(last)
-    _check_actions(saved, count)
+    _, outputs = flow(last)
+    _check_actions(saved, outputs)
+    count = prod(saved.choices) if saved.choices else outputs
     told: dict[str, Any] = {"activation": _named(between, hidden)}
     if saved.algorithm != "RecurrentPPO":
         network = Network(nn.Sequential(*before, after), _seen(saved, seen, before, after), divisor)
         about = saved.about(network.seen, count, layers=sizes(network.layers), **told)
-        return Drawing(about, plain(network))
+        return Drawing(about, _combining(saved, plain(network)))
     memory = lstm(weights, "lstm_actor.")
     network = Network(nn.Sequential(*before), _seen(saved, seen, before, memory), divisor)
     about = saved.about(
@@ -241,7 +251,20 @@ def _drawing(saved: _Saved, options: Options) -> Drawing:
         memory=2 * memory.num_layers * memory.hidden_size,
         **told,
     )
-    return Drawing(about, Recurrent(network, memory, after))
+    return Drawing(about, _combining(saved, Recurrent(network, memory, after)))
+
+
+def _combining(saved: _Saved, scores: Scores) -> Scores:
+    """Returns the scores of actions, where a network tells those of the choices of their parts."""
+    if len(saved.choices) < 2:
+        return scores
+    ends = np.cumsum(saved.choices)[:-1]
+
+    def told(observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
+        logits, state = scores(observations, state, begins)
+        return combined(np.split(logits, ends, axis=1)), state
+
+    return told
 
 
 def _seen(
@@ -275,10 +298,10 @@ def _named(between: type[nn.Module], layers: nn.Sequential) -> str:
 
 def _check_actions(saved: _Saved, count: int) -> None:
     """Refuses a network that has more or fewer outputs than there are actions."""
-    said = _actions(saved.data)
+    said = sum(saved.choices)
     if said and said != count:
         raise InputError(
-            f"The network in '{saved.file.path}' has {count} outputs for {said} actions.",
+            f"The network in '{saved.file.path}' has {count} outputs for {said} choices.",
             "Save the model again: model.save(…).",
         )
 
@@ -304,7 +327,3 @@ def _module(data: Mapping[str, Any]) -> str:
     kind = data.get("policy_class")
     said = kind.get("__module__", "") if isinstance(kind, dict) else ""
     return re.sub(r"[^\w.]", "?", str(said))
-
-
-def _actions(data: Mapping[str, Any]) -> int:
-    return archived.states(data.get("action_space"))

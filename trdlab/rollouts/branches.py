@@ -11,7 +11,7 @@ from trdlab.environments import Environments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Future
 from trdlab.policies import Policy
-from trdlab.rollouts.playing import Playing, Watch, unwatched
+from trdlab.rollouts.playing import Playing, Watch, any_actions, unwatched
 from trdlab.rollouts.realised import Samples, on_axis
 
 
@@ -126,9 +126,13 @@ class Branching:
         while playing.running.any():
             turn = playing.turn()
             due = np.flatnonzero(playing.running & (playing.steps % every == phase))  # [M′]
+            if foils and playing.allowed is not None:  # there has to be another one
+                due = due[playing.allowed[due].sum(axis=1) > 1]
             if len(due):
-                own, actions = turn.own[due], turn.actions[due]
-                first = _others(own, environments.num_actions, rng) if foils else actions
+                first = turn.actions[due]
+                if foils:
+                    allowed = None if playing.allowed is None else playing.allowed[due]
+                    first = _others(turn.own[due], environments.num_actions, rng, allowed)
                 found.append(self._continued(playing, due, first, rng))
             playing.take(turn.actions)
             watch(playing.progress(what))
@@ -149,13 +153,18 @@ class Branching:
             seed: of the copies.
 
         Raises:
-            InputError: there is no such action.
+            InputError: there is no such action, or it cannot be taken here.
             NotCopyable: the environments cannot be copied.
         """
         num_actions = playing.environments.num_actions
         if not 0 <= action < num_actions:
             raise InputError(
                 f"There is no action {action}.", f"They run from 0 to {num_actions - 1}."
+            )
+        if playing.allowed is not None and not playing.allowed[0, action]:
+            allowed = np.flatnonzero(playing.allowed[0]).tolist()
+            raise InputError(
+                f"The environment forbids action {action} here.", f"It allows {allowed}."
             )
         rng = np.random.default_rng(seed)
         return _joined([self._continued(playing, np.array([0]), np.array([action]), rng)])
@@ -219,8 +228,16 @@ def _joined(found: list[Branches]) -> Branches:
     return replace(found[0], **arrays)
 
 
-def _others(actions: IntArray, num_actions: int, rng: np.random.Generator) -> IntArray:
-    """Returns `[M]`: another action in place of each, drawn evenly."""
+def _others(
+    actions: IntArray,
+    num_actions: int,
+    rng: np.random.Generator,
+    allowed: BoolArray | None = None,
+) -> IntArray:
+    """Returns `[M]`: another action in place of each, drawn evenly, of those `allowed [M, A]`."""
     if num_actions < 2:
         raise InputError("There is one action only.", "A foil is another one.")
+    if allowed is not None:
+        others = allowed & (np.arange(num_actions) != actions[:, None])
+        return any_actions(rng, len(actions), num_actions, others)
     return np.asarray((actions + rng.integers(1, num_actions, size=len(actions))) % num_actions)

@@ -145,13 +145,24 @@ class Playing:
         self._decision: Decision | None = None
         self._turn: Turn | None = None
         self._last: Any = None
+        self._last_allowed: BoolArray | None = None
+
+    @property
+    def allowed(self) -> BoolArray | None:
+        """`[B, A]`, which actions can be taken at this step; None where all can always be."""
+        allowed: BoolArray | None = getattr(self.environments, "allowed", None)
+        return allowed
 
     def decide(self) -> Decision:
         """Returns what is expected where R episodes go on, and how likely each action is."""
         if self._decision is None:
             seen = self.stack.observations[self.running]
             told = self._told(seen)
-            likely = greedy(told.value) if self._policy is None else self._ask(self._policy, seen)
+            likely = (
+                greedy(told.value, _of(self.allowed, self.running))
+                if self._policy is None
+                else self._ask(self._policy, seen)
+            )
             self._decision = Decision(told, likely)
         return self._decision
 
@@ -168,7 +179,9 @@ class Playing:
             random, actions = np.zeros(count, dtype=np.bool_), own
             if self._epsilon:
                 random = self.running & (self._chance.random(count) < self._epsilon)
-                any_action = self._chance.integers(self.environments.num_actions, size=count)
+                any_action = any_actions(
+                    self._chance, count, self.environments.num_actions, self.allowed
+                )
                 actions = np.where(random, any_action, own)
             self._turn = Turn(likely, own, random, actions)
         return self._turn
@@ -182,6 +195,7 @@ class Playing:
         self.finished, self.running = self.running & over, self.running & ~over
         self.stack.push(step.frames, np.zeros_like(over))  # where episodes end, their last ones
         self._last = self.stack.observations[self.finished]
+        self._last_allowed = _of(step.allowed, self.finished)
         self.stack.begin(step.following, step.ended)
         self._decision, self._turn = None, None
         return step
@@ -194,7 +208,8 @@ class Playing:
     def at_last(self) -> Decision:
         """Returns what is expected at the true last observations of the finished episodes."""
         told = self._told(self._last)
-        return Decision(told, self.last_seen()[1] if self._policy else greedy(told.value))
+        own = greedy(told.value, self._last_allowed)
+        return Decision(told, self.last_seen()[1] if self._policy else own)
 
     def last_seen(self) -> tuple[Any, FloatArray]:
         """Returns the true last observations, and how likely the policy takes each action there."""
@@ -202,7 +217,7 @@ class Playing:
             raise TypeError("Nobody was given who acts.")
         memory = rows(self._memory, self.finished[self._asked])
         nowhere = np.zeros(len(self._last), dtype=np.bool_)
-        return self._last, ask(self._policy, self._last, memory, nowhere)[0]
+        return self._last, ask(self._policy, self._last, memory, nowhere, self._last_allowed)[0]
 
     def branch(self, which: IntArray, *, rng: np.random.Generator, max_steps: int) -> "Playing":
         """Returns copies of episodes at this step, with what their policy remembers of it.
@@ -242,8 +257,29 @@ class Playing:
         memory = rows(self._memory, self.running[self._asked])
         self._asked = np.flatnonzero(self.running)
         begins = np.full(len(self._asked), self.steps == 0)
-        likely, self._memory = ask(policy, observations, memory, begins)
+        allowed = _of(self.allowed, self.running)
+        likely, self._memory = ask(policy, observations, memory, begins, allowed)
         return likely
+
+
+def any_actions(
+    rng: np.random.Generator, count: int, num_actions: int, allowed: BoolArray | None = None
+) -> IntArray:
+    """Returns any action for each episode `[B]`, evenly among those that can be taken.
+
+    Args:
+        rng: what they are drawn from.
+        count: B.
+        num_actions: A.
+        allowed: `[B, A]`, which can be taken; None where all can always be.
+    """
+    if allowed is None:
+        return rng.integers(num_actions, size=count)
+    return _drawn(allowed / allowed.sum(axis=1, keepdims=True), rng.random(count))
+
+
+def _of(allowed: BoolArray | None, which: BoolArray) -> BoolArray | None:
+    return None if allowed is None else allowed[which]
 
 
 def _drawn(probabilities: FloatArray, level: FloatArray) -> IntArray:

@@ -13,6 +13,7 @@ from trdlab.explanations.comparison import claims as comparing
 from trdlab.explanations.comparison.comparison import SIDES, Comparison
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.explanation import Explanation
+from trdlab.explanations.moment.moment import Choice
 from trdlab.explanations.rules import plain_data
 from trdlab.explanations.words import counted
 from trdlab.formatting import decimals_for, number
@@ -36,7 +37,7 @@ def _(explanation: Explanation) -> Document:
         choice = replace(choice, foil=None)  # their difference is told to who asks for a contrast
     return Document(
         heading=" · ".join(heading),
-        setting=(*axis_words(explanation.time_axis), *_played(explanation)),
+        setting=(*axis_words(explanation.time_axis), *_played(explanation), *_forbidden(choice)),
         scene=None if state is None or agent.world is None else scene_of(agent.world, state),
         table=None if choice is None else action_table(choice),
         answer=tuple(claim.sentence for claim in explanation.answer),
@@ -77,6 +78,12 @@ def _played(explanation: Explanation) -> list[str]:
     if limit is not None and limit in cut:
         words.append(f"episodes are cut off after {counted(limit, 'step')}")
     return words
+
+
+def _forbidden(choice: Choice | None) -> list[str]:
+    """Returns which actions cannot be taken, if some cannot."""
+    names = () if choice is None else choice.moment.forbidden
+    return [f"forbidden here: {', '.join(names)}"] if names else []
 
 
 def _where(comparison: Comparison) -> list[str]:
@@ -145,8 +152,8 @@ def _(comparison: Comparison) -> dict[str, Any]:
         "schema": "trdlab.compare/2",
         "agents": {
             side: {
-                "name": agents[i].name,
-                "words": [] if (of := agents[i].origin) is None else list(of.words),
+                "name": comparison.names[i],
+                "words": list(comparison.words[i]),
                 "future": agents[i].estimator.future.to_dict(),
                 "mean": plain_data({end: of[i] for end, of in vars(comparison.means).items()}),
                 "calibration": None if report is None else data(report),
@@ -194,6 +201,7 @@ def _moment(explanation: Explanation) -> dict[str, Any] | None:
         "error": None if own is None else plain_data(own.off_by),
         "foil_error": None if foils is None else plain_data(foils.off_by),
         "only_reward": choice.moment.only_reward,
+        "forbidden": list(choice.moment.forbidden),
         "action": choice.action,
         "foil": choice.foil,
     }

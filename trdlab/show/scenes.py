@@ -1,14 +1,12 @@
 """Scenes: what stands around the numbers of a solved world, and which state it is."""
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from trdlab.formatting import plain
 from trdlab.gridworld import Gridworld
 from trdlab.gridworld.ansi import ansi, legend
-
-if TYPE_CHECKING:
-    from trdlab.tabular.named import TabularWorld
+from trdlab.tabular.named import TabularWorld
 
 _LIMIT = "The environment cuts episodes off after {} steps; the model does not."
 _NEVER = "Episodes are over in this state, or never come to it."
@@ -40,7 +38,7 @@ class Scene(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def scene_of(world: "Gridworld | TabularWorld", state: int) -> Scene:
+def scene_of(world: Gridworld | TabularWorld, state: int) -> Scene:
     """Returns the scene of a state of a solved world."""
     return _on_map(world, state) if isinstance(world, Gridworld) else _in_table(world, state)
 
@@ -63,7 +61,7 @@ def _on_map(world: Gridworld, state: int) -> Scene:
     )
 
 
-def _in_table(world: "TabularWorld", state: int) -> Scene:
+def _in_table(world: TabularWorld, state: int) -> Scene:
     from trdlab.environments.arguments import say_arguments  # gridworlds do without it
 
     mdp, here = world.mdp, world.describe(state)

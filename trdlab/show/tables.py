@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from trdlab.arrays import FloatArray, same
+from trdlab.arrays import FloatArray, difference
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.formatting import amount, decimals_for, decimals_to_tell, number
 
@@ -54,7 +54,9 @@ def action_table(choice: Choice) -> Table | None:
     styles = {name: "dim" for name in moment.action_names if name not in (action, foil)}
     if foil is not None:
         gap = moment.difference(action, foil)
-        q_gap, total = (_gap(of(action), of(foil)) for of in (moment.q_value, moment.total))
+        q_gap, total = (
+            float(difference(of(action), of(foil))) for of in (moment.q_value, moment.total)
+        )
         decimals = max(decimals, decimals_for(gap), decimals_for([q_gap]))
         of_totals = max(of_totals, decimals_for([total]))
         name = f"{action} − {foil}"
@@ -63,10 +65,6 @@ def action_table(choice: Choice) -> Table | None:
     heading = ("action", *axis.labels, "Q", *["total"] * has_totals, "")
     sides = "<" + ">" * len(heading[2:]) + "<"
     return Table(heading, tuple(rows), sides, styles, axis.num_components)
-
-
-def _gap(a: float, b: float) -> float:
-    return 0.0 if same(a, b) else a - b
 
 
 def _note(moment: Moment, i: int) -> str:

@@ -13,7 +13,7 @@ from trdlab.environments.outcomes import INFO
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.estimator import Future
 from trdlab.runs import MetricsFile, RunFolder, checkpoint_steps, load_checkpoint, save_checkpoint
-from trdlab.runs.folder import is_fit
+from trdlab.runs.folder import check_free, is_fit
 from trdlab.time_axis import TimeAxis
 
 if TYPE_CHECKING:
@@ -124,22 +124,16 @@ class Plan:
         )
 
 
-def begin_fit(path: Path, plan: Plan, interface: Interface, future: Future) -> RunFolder:
-    """Makes the folder of a fit, or opens it where the same one was begun and stopped.
-
-    Args:
-        path: the folder.
-        plan: what is fitted to whom.
-        interface: what the agent sees and does.
-        future: whose future is told.
+def find_fit(path: Path, plan: Plan) -> RunFolder | None:
+    """Returns the folder of the same fit, if it was begun and stopped there; None if it is free.
 
     Raises:
-        OutputError: there is something else already, or it cannot be written.
+        OutputError: there is something else.
         InputError: another fit was begun there.
     """
     if not is_fit(path):
-        extra = {"fit": {"interface": interface.to_dict(), "future": future.to_dict()}}
-        return RunFolder.create(path, plan.to_config(), extra)
+        check_free(path)
+        return None
     folder = RunFolder.open(path)
     if is_done(folder):
         raise OutputError(f"'{path}' holds a fit that is done.", "Choose another `out`.")
@@ -155,6 +149,22 @@ def begin_fit(path: Path, plan: Plan, interface: Interface, future: Future) -> R
     return folder
 
 
+def new_fit(path: Path, plan: Plan, interface: Interface, future: Future) -> RunFolder:
+    """Makes the folder of a fit.
+
+    Args:
+        path: the folder.
+        plan: what is fitted to whom.
+        interface: what the agent sees and does.
+        future: whose future is told.
+
+    Raises:
+        OutputError: there is something already, or it cannot be written.
+    """
+    extra = {"fit": {"interface": interface.to_dict(), "future": future.to_dict()}}
+    return RunFolder.create(path, plan.to_config(), extra)
+
+
 def is_done(folder: RunFolder) -> bool:
     """Returns whether a fit has come to its end."""
     return bool(checkpoint_steps(folder)) and bool(load_checkpoint(folder).state["done"])
@@ -165,7 +175,8 @@ def learn(
     make: "Callable[[Experience], Fit]",
     future: Future,
     *,
-    folder: RunFolder | None = None,
+    found: RunFolder | None = None,
+    new: Callable[[], RunFolder] | None = None,
     seconds: float | None = None,
     judge: "Callable[[Fit], tuple[int, ...]]" = lambda fitting: (),
     tell: "Callable[[FitProgress], None]" = lambda progress: None,
@@ -177,7 +188,8 @@ def learn(
         experience: plays; it is not asked where that has been done.
         make: begins to fit what was played.
         future: whose future is told.
-        folder: where it is kept; None for nowhere.
+        found: where it was begun and stopped; None where that is not so.
+        new: makes the folder to keep it in, once something has been played; None for nowhere.
         seconds: after which learning stops, if not before.
         judge: says how far each channel reaches, when all is learned.
         tell: told of each look at the held-out error.
@@ -187,12 +199,15 @@ def learn(
         Stopped: it should, and what has been learned is saved if there is a folder.
         OutputError: the disk is full; what was saved before is whole.
     """
+    is_saved = found is not None and bool(checkpoint_steps(found))
+    fitting = _restored(found, make) if found and is_saved else make(experience())
+    folder = found or (new() if new is not None else None)
     if folder is None:
-        fitting = make(experience())
         _rounds(fitting, seconds, tell, should_stop, lambda: None)
         return replace(fitting.estimator(future), reach=judge(fitting))
     with folder.held():
-        fitting = _begun(folder, experience, make, future)
+        if not is_saved:
+            _save(folder, fitting, future)
         with MetricsFile(folder.metrics, fitting.num_updates) as metrics:
 
             def told(progress: "FitProgress") -> None:
@@ -223,26 +238,16 @@ def _rounds(
             saved = time.monotonic()
 
 
-def _begun(
-    folder: RunFolder,
-    experience: "Callable[[], Experience]",
-    make: "Callable[[Experience], Fit]",
-    future: Future,
-) -> "Fit":
-    """Returns a fit as it was saved, or at its beginning, which is saved."""
+def _restored(folder: RunFolder, make: "Callable[[Experience], Fit]") -> "Fit":
+    """Returns a fit as it was saved."""
     from trdlab.deep.experience import Experience
 
-    if not checkpoint_steps(folder):
-        fitting = make(experience())
-        _save(folder, fitting, future)
-        return fitting
     checkpoint = load_checkpoint(folder)
-    kinds = checkpoint.state["experience"]
-    columns = {
+    columns: dict[str, Any] = {
         name: np.frombuffer(checkpoint.blocks.get(name, b""), dtype).reshape(shape)
-        for name, (dtype, shape) in kinds.items()
+        for name, (dtype, shape) in checkpoint.state["columns"].items()
     }
-    fitting = make(Experience(**columns))
+    fitting = make(Experience(**columns, **checkpoint.state["stacks"]))
     fitting.load_state_dict(checkpoint.state["learner"])
     return fitting
 
@@ -259,13 +264,11 @@ def _save(
     from trdlab.deep.update import arrays_of
 
     estimator = fitting.estimator(future)
+    played = fitting.experience
     columns = (
         {}
         if done
-        else {
-            field.name: np.ascontiguousarray(getattr(fitting.experience, field.name))
-            for field in fields(fitting.experience)
-        }
+        else {name: np.ascontiguousarray(column) for name, column in played.columns.items()}
     )
     state = {
         "done": done,
@@ -274,7 +277,8 @@ def _save(
         "possible": fitting.possible,
         "reach": list(reach),
         "hidden": [getattr(layer, "out_features", 0) for layer in fitting.network.body.children()],
-        "experience": {name: [of.dtype.str, list(of.shape)] for name, of in columns.items()},
+        "columns": {name: [of.dtype.str, list(of.shape)] for name, of in columns.items()},
+        "stacks": {"stack": played.stack, "padding": played.padding},
         "learner": {} if done else fitting.state_dict(),
     }
     blocks = {name: of.data.cast("B") for name, of in columns.items() if of.size}
@@ -285,7 +289,7 @@ def load_fit(path: Path) -> "tuple[NetworkEstimator, Interface, Plan]":
     """Returns what was fitted, the best of it so far, what its agent sees and does, and the plan.
 
     Raises:
-        TrdlabError: something is torn, or nothing has been learned yet.
+        TrdlabError: something is torn.
     """
     from trdlab.deep.channels import Channel
     from trdlab.deep.estimator import NetworkEstimator
@@ -293,10 +297,6 @@ def load_fit(path: Path) -> "tuple[NetworkEstimator, Interface, Plan]":
     from trdlab.deep.update import load_weights
 
     folder = RunFolder.open(path)
-    if not checkpoint_steps(folder):
-        raise TrdlabError(
-            f"Nothing has been learned yet in '{path}'.", f"Go on: {folder.resume_command}."
-        )
     state = load_checkpoint(folder).state
     try:
         plan, told = Plan.from_config(folder.config), folder.manifest["fit"]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from trdlab.deep.trainer import TrainMetrics
     from trdlab.environments.outcomes import Outcome
     from trdlab.policies import Who
+    from trdlab.runs import RunFolder
 
 
 def agent(
@@ -252,21 +253,21 @@ def fit(
         own = frozen.estimator.time_axis.gamma if frozen.is_fitted else 0.99
     axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)
     read, made_of = Outcomes(dict(parts or {}) | dict(outcomes or {})), tuple(parts or ())
-    folder, of = None, frozen.origin
+    found, of = None, frozen.origin
+    plan = fitted.Plan(
+        agent=None if of is None else of.name,
+        env=of.env if of is not None and of.away else None,
+        env_arguments=of.env_arguments if of is not None and of.away else (),
+        solved_for=of.time_axis.gamma if of is not None and of.time_axis else None,
+        axis=axis,
+        steps=steps,
+        share=share,
+        outcomes=read.places,
+        parts=made_of,
+        settings=chosen,
+    )
     if out is not None:
-        plan = fitted.Plan(
-            agent=None if of is None else of.name,
-            env=of.env if of is not None and of.away else None,
-            env_arguments=of.env_arguments if of is not None and of.away else (),
-            solved_for=of.time_axis.gamma if of is not None and of.time_axis else None,
-            axis=axis,
-            steps=steps,
-            share=share,
-            outcomes=read.places,
-            parts=made_of,
-            settings=chosen,
-        )
-        folder = fitted.begin_fit(Path(out), plan, frozen.interface, future)
+        found = fitted.find_fit(Path(out), plan)
     watch = FitWatch(steps)
 
     def taken(count: int) -> None:
@@ -294,6 +295,9 @@ def fit(
         space = frozen.interface.space
         return Fit(experience, space, axis, chosen, names=read.names, parts=made_of)
 
+    def kept() -> "RunFolder":
+        return fitted.new_fit(Path(str(out)), plan, frozen.interface, future)
+
     def judge(fitting: Fit) -> tuple[int, ...]:
         return tuple(calibrate(of, seed=seed).trust.components for of in fitting.samples())
 
@@ -302,7 +306,8 @@ def fit(
             played,
             begun,
             future,
-            folder=folder,
+            found=found,
+            new=None if out is None else kept,
             seconds=seconds,
             judge=judge,
             tell=watch.tell if progress else lambda now: None,

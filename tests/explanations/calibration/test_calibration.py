@@ -370,8 +370,7 @@ def test_groups_are_calibrated_and_trusted_in_steps():
 
 
 def test_blame_refuses_what_has_no_neighbours():
-    with pytest.raises(InputError, match="cannot stand in for each other"):
-        errors_of(pool(played(circuit(TimeAxis(0.95, 1)))))
+    assert errors_of(pool(played(circuit(TimeAxis(0.95, 1))))) is None
 
 
 # ---- the residual --------------------------------------------------------------------------------

@@ -5,8 +5,7 @@ import pytest
 
 from by_hand import episode
 from trdlab.decomposition import TimeAxis
-from trdlab.explanations.episode.played import Played
-from trdlab.explanations.episode.revision import revise
+from trdlab.explanations.episode.played import revise
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.rollouts.episodes import collect
 from trdlab.tabular import exact
@@ -63,7 +62,6 @@ def test_an_episode_shorter_than_a_group_has_no_revision():
     axis = TimeAxis(0.5, 1, 5)
     cut = episode([1.0], axis, [[1.0, 1.0], [1.0, 1.0]], terminated=False)
     assert len(revise(cut)) == 0
-    assert Played(cut, ("wait",)).row(0) is None
 
 
 @pytest.mark.parametrize("name", ["drone", "corridor", "loop", "patience", "tie", "windy"])

@@ -174,13 +174,13 @@ def test_foils_are_judged_beside_what_the_agent_does():
     agent = gridworld_agent("ledge", AXIS)
     copying = Copying(episodes=60, moments=5, copies=8)
     healthy = assess(agent, episodes=100, copying=copying)
-    assert healthy.foil_trust is not None
-    assert healthy.foil_trust.components >= 3
+    assert healthy.foils is not None
+    assert healthy.foils.trust.components >= 3
     invents = changed(agent, action=2, component=0, by=1.0)  # left, which it never takes
     worse = assess(replace(invents, policy=agent.policy), episodes=100, copying=copying)
     assert worse.trust.components == healthy.trust.components
-    assert worse.foil_trust is not None
-    assert worse.foil_trust.components == 0
+    assert worse.foils is not None
+    assert worse.foils.trust.components == 0
 
 
 @settings(max_examples=300, deadline=None, derandomize=True)

@@ -307,7 +307,7 @@ def test_a_scaled_model_says_the_same_with_scaled_numbers(moment: Moment, power:
     def judged(of: Calibration | None) -> Calibration | None:
         if of is None:
             return None
-        amount = None if of.only_reward is None else of.only_reward * scale
+        amount = None if of.reliability is None else of.reliability.amount * scale
         return calibrated(of.time_axis, of.status, of.off_by * scale, amount)
 
     times = {

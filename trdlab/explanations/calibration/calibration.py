@@ -132,11 +132,6 @@ class Calibration:
         """`[N+1]`: the root mean square of predicted − observed; NaN where it is not known."""
         return np.where(np.isfinite(self.error.low), np.sqrt(self.error.value), np.nan)
 
-    @property
-    def only_reward(self) -> float | None:
-        """The one reward that was ever observed besides 0; None if there are more, or unknown."""
-        return None if self.reliability is None else self.reliability.amount
-
 
 def calibrate(episodes: Sequence[Episode] | Samples, *, seed: int = 0) -> Calibration:
     """Returns how well each component was predicted.

@@ -294,14 +294,14 @@ def to_dict(report: CalibrationReport) -> dict[str, Any]:
     estimate is `value` with `low` and `high`. What does not exist, and an end of an interval that
     is infinite, is `null`.
     """
-    foils = report.foil_trust
+    foils = report.foils
     data: dict[str, Any] = plain_data(report)
     del data["future"]
     return {
         "schema": SCHEMA,
         **data,
         "trusted": _trusted(report.trust),
-        "foils_trusted": None if foils is None else _trusted(foils),
+        "foils_trusted": None if foils is None else _trusted(foils.trust),
         "faults": [claim.kind for claim in faults.faults(report)],
         "sections": [section.to_dict() for section in sections(report)],
     }

@@ -5,15 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.errors import InputError
+from trdlab.explanations.moment.steps import LEAST_DISCOUNT
 from trdlab.rollouts.realised import Samples
 from trdlab.statistics import Estimate, by_episode, draws, has_enough, pooled
 
 LARGEST_SHIFT = 10
 AGREEMENT = 0.99
 """The share of bootstrap samples in which a shift must be the best one, to be blamed."""
-MIN_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25
-"""Below this the discount of a component cannot be taken out of it again."""
 LEAST_SMEAR = 0.05
 """Less than this is not blamed."""
 SLACK = 0.1
@@ -49,18 +47,15 @@ def is_off(amount: Estimate) -> bool:
     return 0.0 <= amount.high < 1.0 - SLACK or amount.low > 1.0 + SLACK
 
 
-def errors_of(samples: Samples, *, seed: int = 0) -> Errors:
+def errors_of(samples: Samples, *, seed: int = 0) -> Errors | None:
     """Returns what is wrong with the timing, the amount and the sharpness of a forecast.
 
-    Raises:
-        InputError: there are fewer than 2 explicit components, or their discounts vanish.
+    It is None where no component can stand in for another: there are fewer than 2 explicit ones, or
+    their discounts vanish.
     """
     axis, known = samples.time_axis, samples.known[:, :-1]  # [M, N]
-    if axis.horizon < 2 or axis.discounts[-2] < MIN_DISCOUNT:
-        raise InputError(
-            f"Components of {axis} cannot stand in for each other.",
-            "Decompose with N of at least 2, and γ above 0.",
-        )
+    if axis.horizon < 2 or axis.discounts[-2] < LEAST_DISCOUNT:
+        return None
     p, o = (of[:, :-1] / axis.discounts[:-1] for of in (samples.predicted, samples.observed))
     best, agreement = _best_shift(samples, p, o, seed)
     is_sure = agreement >= AGREEMENT and not _spoils(samples, p, o, best, seed)

@@ -12,7 +12,7 @@ from trdlab.estimator import Future
 from trdlab.explanations.calibration.calibration import Calibration, Trust, calibrate
 from trdlab.explanations.calibration.ceiling import Ceiling, ceiling_of
 from trdlab.explanations.calibration.consistency import Consistency, consistency_of
-from trdlab.explanations.calibration.errors import MIN_DISCOUNT, Errors, errors_of
+from trdlab.explanations.calibration.errors import Errors, errors_of
 from trdlab.explanations.calibration.residual import Residual, residual_of
 from trdlab.printable import Printable
 from trdlab.rollouts.branches import Branches
@@ -121,11 +121,6 @@ class CalibrationReport(Printable):
         return self.calibration.trust
 
     @property
-    def foil_trust(self) -> Trust | None:
-        """How far the forecasts of actions can be trusted that the policy would not have taken."""
-        return None if self.foils is None else self.foils.trust
-
-    @property
     def time_axis(self) -> TimeAxis:
         """What the components mean."""
         return self.calibration.time_axis
@@ -172,7 +167,6 @@ def judge(
                 f"The episodes are of {axis}, the copies of {copied.time_axis}.",
                 "Play both with the same estimator.",
             )
-    has_neighbours = axis.horizon > 1 and axis.discounts[-2] >= MIN_DISCOUNT
     judged = score_of(episodes, seed=seed)
     return CalibrationReport(
         future=future,
@@ -180,7 +174,7 @@ def judge(
         judged=judged,
         calibration=calibrate(samples, seed=seed),
         residual=residual_of(episodes, seed=seed),
-        errors=errors_of(samples, seed=seed) if has_neighbours else None,
+        errors=errors_of(samples, seed=seed),
         consistency=consistency_of(episodes, seed=seed) if axis.horizon else None,
         ceiling=None if branches is None else ceiling_of(branches, seed=seed),
         foils=None if foils is None else calibrate(foils, seed=seed),

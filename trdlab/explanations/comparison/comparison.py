@@ -63,6 +63,16 @@ class Comparison(Printable):
         return self.visits.time_axis
 
     @property
+    def names(self) -> tuple[str, str]:
+        """Of the two."""
+        return self.agents[0].name, self.agents[1].name
+
+    @property
+    def words(self) -> tuple[tuple[str, ...], ...]:
+        """What names each on the command line, where both act; nothing of who has no such name."""
+        return tuple(() if of.origin is None else of.origin.words for of in self.agents)
+
+    @property
     def titles(self) -> tuple[str, ...]:
         """Who A and who B is; in full where their names do not tell."""
         names = [agent.name for agent in self.agents]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trdlab.agents.agent import Agent
-from trdlab.arrays import FloatArray, IntArray
+from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.policies import acting, ask, greedy
 from trdlab.rollouts.playing import Playing, Progress, Watch, unwatched
@@ -159,6 +159,7 @@ class _Seen:
     step: int
     observation: NDArray[Any]
     probabilities: tuple[FloatArray | None, ...]  # [1, A] each; None of who can be asked later
+    allowed: BoolArray | None  # [1, A], which actions can be taken; None where all can always be
 
 
 class _Kept:
@@ -197,9 +198,11 @@ def _played(
             at, observation = playing.steps, np.array(playing.stack.observations)  # [1, ...]
             turn, likely = playing.turn(), None
             if other is not None:
-                likely, memory = ask(other, observation, memory, np.array([at == 0]))
-            told = (turn.probabilities, likely)
-            seen = _Seen(player, seed, at, observation[0], told if player == 0 else told[::-1])
+                begins = np.array([at == 0])
+                likely, memory = ask(other, observation, memory, begins, playing.allowed)
+            told = (turn.probabilities, likely)[:: 1 if player == 0 else -1]
+            allowed = None if playing.allowed is None else playing.allowed.copy()
+            seen = _Seen(player, seed, at, observation[0], told, allowed)
             step = playing.take(turn.actions)
             is_cut = bool(playing.finished[0] and not step.ended[0])
             yield seen, turn.actions.tobytes() + step.rewards.tobytes(), is_cut
@@ -214,8 +217,10 @@ def _decided(
         for i in range(0, len(found), _BATCH)
     ]
     told = [seen.probabilities[number] for seen in found]
+    masks = [seen.allowed for seen in found if seen.allowed is not None]
+    values = np.concatenate([batch.value for batch in batches])
     likely = (
-        np.concatenate([greedy(batch.value) for batch in batches])
+        greedy(values, np.concatenate(masks) if masks else None)
         if agent.policy is None
         else np.concatenate([row for row in told if row is not None])
     )

@@ -10,7 +10,6 @@ from trdlab.explanations.episode.played import EPISODES, Played
 from trdlab.explanations.episode.promises import broken_promises, foreseen
 from trdlab.explanations.episode.surprises import sizes, surprise
 from trdlab.explanations.rules import Claim, Found, every
-from trdlab.explanations.sections import Section
 
 MOMENTS = 5  # of an episode are told
 MOST = 0.5  # of what is expected: a component with a larger share is named
@@ -44,10 +43,6 @@ class Story:
     def claims(self) -> tuple[Claim, ...]:
         """All of it."""
         return (*self.start, *self.moments, *self.end)
-
-    def section(self, seed: int) -> Section:
-        """Returns all of it as a section about the episode with a seed."""
-        return Section("episode", f"The episode with seed {seed}", self.claims)
 
 
 def tell(played: Played) -> Story:

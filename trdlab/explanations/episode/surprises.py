@@ -66,10 +66,9 @@ def _turn(played: Played, row: int) -> Found:
     of = played.revision
     step, before, after = int(of.steps[row]), of.before[row], of.after[row]
     about: Fields = {"step": step, "action": played.action(step)}
-    up, down, moved = moved_between(after - before)
-    if moved:
-        return _shift(about, before, after, up, down, moved)
     change = after - before
+    if moved := float(moved_by(change)):
+        return _shift(about, before, after, moved)
     total = float(change.sum())
     about |= {"gap": abs(total), "outcome": "better" if total > 0.0 else "worse"}
     directed = np.sign(total) * change  # what is above 0 speaks for the outcome
@@ -93,32 +92,30 @@ def _turn(played: Played, row: int) -> Found:
     return "other-reward", about | {"expected": was, "reward": now}
 
 
-def _shift(
-    about: Fields, before: FloatArray, after: FloatArray, up: int, down: int, moved: float
-) -> Found:
+def _shift(about: Fields, before: FloatArray, after: FloatArray, moved: float) -> Found:
     """Returns what a step did that moved rewards, or costs, and left the total about the same."""
-    slack, step = NEARLY * moved, about["step"]
+    slack, step, change = NEARLY * moved, about["step"], after - before
+    up, down = int(change.argmax()), int(change.argmin())
     if before[up] >= -slack and after[down] >= -slack:
         worth, origin, to = moved, down, up
     elif after[up] <= slack and before[down] <= slack:
         worth, origin, to = -moved, up, down
     else:
-        gain, loss = float(after[up] - before[up]), float(before[down] - after[down])
         places = {"up": (step, up), "down": (step, down)}
-        return "exchanged", about | places | {"gain": gain, "loss": loss}
+        gains = {"gain": float(change[up]), "loss": -float(change[down])}
+        return "exchanged", about | places | gains
     kind = "put-off" if to > origin else "brought-forward"
     return kind, about | {"worth": worth, "origin": (step, origin), "to": (step, to)}
 
 
-def moved_between(change: FloatArray) -> tuple[int, int, float]:
-    """Returns where most was gained and lost, and how much of it moved; 0 if the total changed.
+def moved_by(change: FloatArray) -> FloatArray:
+    """Returns `[...]`: how much moved from one component to another; 0 if the total changed.
 
     Args:
-        change: `[N+1]`; its total must be at most half of what moved.
+        change: `[..., N+1]`; its total must be at most half of what moved.
     """
-    up, down = int(change.argmax()), int(change.argmin())
-    moved = max(0.0, float(min(change[up], -change[down])))
-    return up, down, moved if abs(float(change.sum())) <= moved / 2.0 else 0.0
+    moved = np.maximum(0.0, np.minimum(change.max(axis=-1), -change.min(axis=-1)))
+    return np.where(np.abs(change.sum(axis=-1)) <= moved / 2.0, moved, 0.0)
 
 
 def sizes(played: Played) -> FloatArray:
@@ -127,6 +124,5 @@ def sizes(played: Played) -> FloatArray:
     That is how much the total changed; where as much is expected as before, how much moved.
     """
     change = played.revision.change
-    amount = np.abs(change.sum(axis=1))
-    moved = np.maximum(0.0, np.minimum(change.max(axis=1), -change.min(axis=1)))
-    return np.asarray(np.where(amount <= moved / 2.0, moved, amount))
+    moved = moved_by(change)
+    return np.where(moved > 0.0, moved, np.abs(change.sum(axis=1)))

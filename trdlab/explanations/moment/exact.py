@@ -1,7 +1,6 @@
 """Moments of exactly solved models, where everything that can be known is known."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,11 +9,9 @@ from trdlab.explanations.moment.moment import Moment, Uncertainty, WhatIf
 from trdlab.gridworld import Gridworld, Source
 from trdlab.tabular import MDP, ExactTable, improved, optimal, undiscounted_totals
 from trdlab.tabular.chains import Chain
+from trdlab.tabular.named import TabularWorld
 from trdlab.tabular.reach import reached
 from trdlab.tabular.uncertainty import outcomes, spread
-
-if TYPE_CHECKING:
-    from trdlab.tabular.named import TabularWorld
 
 _ROUNDING = 1e-9  # of a total: sums of many steps that differ by less are the same
 GAMMA_RANGE = (0.01, 0.99)
@@ -120,21 +117,16 @@ def gridworld_moment(world: Gridworld, table: ExactTable, state: int) -> Moment:
     return tabular_moment(table, state, world.action_names, what_ifs)
 
 
-def exact_moment(world: "Gridworld | TabularWorld", table: ExactTable, state: int) -> Moment:
+def exact_moment(world: Gridworld | TabularWorld, table: ExactTable, state: int) -> Moment:
     """Returns what the table of a model expects in one state, with what can be varied there."""
     if isinstance(world, Gridworld):
         return gridworld_moment(world, table, state)
-    return tabular_moment(table, state, world.action_names, gamma_what_ifs(table, state))
-
-
-def gamma_what_ifs(table: ExactTable, state: int) -> list[WhatIf]:
-    """Returns γ as a quantity that can be varied, where few enough states can follow."""
     from trdlab.tabular.models import part_after  # gridworlds do without it
 
     gamma, part = table.time_axis.gamma, part_after(table.mdp, state)
-    if part.num_states > MAX_WHAT_IF_STATES:
-        return []
-    return [gamma_what_if(part, gamma, part.start)]
+    is_small = part.num_states <= MAX_WHAT_IF_STATES
+    what_ifs = [gamma_what_if(part, gamma, part.start)] if is_small else []
+    return tabular_moment(table, state, world.action_names, what_ifs)
 
 
 def gamma_what_if(mdp: MDP, gamma: float, state: int) -> WhatIf:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from trdlab.arrays import FloatArray, difference, same
+from trdlab.arrays import FloatArray, difference
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, closest
 from trdlab.estimator import Estimator, Future, Outlook
@@ -38,8 +38,7 @@ class WhatIf(NamedTuple):
     def gap(self, action: int, foil: int, value: float) -> float:
         """Returns Q(action) − Q(foil) at a value, 0 where they differ only by rounding."""
         q_values = self.q_values(value)
-        a, b = float(q_values[action]), float(q_values[foil])
-        return 0.0 if same(a, b) else a - b
+        return float(difference(q_values[action], q_values[foil]))
 
     def verb(self, of_gamma: str, of_reward: str, of_cost: str) -> str:
         """Returns the word for what this quantity does: γ is, a source pays or costs."""
@@ -85,6 +84,7 @@ class Moment:
         calibration: how good such forecasts are, if that has been judged.
         foils: the same of first actions that the policy does not take.
         seconds_per_step: how long a step takes as people play, if that is known.
+        forbidden: the names of actions that cannot be taken here; they are none of the A.
     """
 
     decomposition: RewardDecomposition
@@ -102,6 +102,7 @@ class Moment:
     calibration: "Calibration | None" = None
     foils: "Calibration | None" = None
     seconds_per_step: float | None = None
+    forbidden: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):
@@ -125,8 +126,11 @@ class Moment:
         """Returns the number of an action.
 
         Raises:
-            InputError: there is no such action; the message suggests one.
+            InputError: there is no such action, and the message suggests one; or it is forbidden.
         """
+        if action in self.forbidden:
+            allowed = ", ".join(self.action_names)
+            raise InputError(f"The environment forbids '{action}' here.", f"It allows {allowed}.")
         if action not in self.action_names:
             raise InputError(f"There is no action '{action}'.", closest(action, self.action_names))
         return self.action_names.index(action)
@@ -147,7 +151,8 @@ class Moment:
     @property
     def only_reward(self) -> float | None:
         """The one reward that was ever observed besides 0; None if there are more, or unknown."""
-        return None if self.calibration is None else self.calibration.only_reward
+        known = None if self.calibration is None else self.calibration.reliability
+        return None if known is None else known.amount
 
     def judged(self, action: str) -> "Calibration | None":
         """Returns how good forecasts of such an action are, if that has been judged."""

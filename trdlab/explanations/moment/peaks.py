@@ -12,7 +12,6 @@ from trdlab.explanations.moment.steps import (
     largest,
     shares,
     stands_out,
-    told_at,
     undiscounted,
 )
 from trdlab.explanations.rules import Claim, Fields, every
@@ -63,9 +62,11 @@ def peak(choice: Choice) -> Iterator[Fields]:
     i = int(sizes.argmax())
     is_alone = bool((np.delete(sizes, i) < sizes[i]).all())
     if is_alone and (moment.is_exact or i in peaks(moment, action)):
+        is_group = choice.time_axis.width > 1  # what it is worth now is told of that
+        told = moment.components(action) if is_group else undiscounted(moment, action)
         is_sure = moment.is_sure(action, slice(i, i + 1))
-        fields = {"component": i, "worth": choice.time_axis.width > 1, "average": is_sure}
-        yield _about(choice) | fields | {"amount": abs(told_at(moment, action, i))}
+        fields = {"component": i, "worth": is_group, "average": is_sure}
+        yield _about(choice) | fields | {"amount": abs(float(told[i]))}
 
 
 @CHOICES.rule("{last_step:within} the {effect:text} expected of {action} peaks {components:whens}.")

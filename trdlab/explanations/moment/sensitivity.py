@@ -42,7 +42,9 @@ def find_flips(gap: Gap, low: float, high: float) -> tuple[float, ...]:
     [-0.5, 0.5]
     """
     known = {float(x): gap(float(x)) for x in np.linspace(low, high, SAMPLES + 1)}
-    known |= {x: gap(x) for x in _beside_zeros(known)}
+    # where an interval begins or ends in a zero, the sign within counts
+    within = [x + 0.382 * (y - x) for x, y in pairwise(known) if known[x] * known[y] == 0.0]
+    known |= {x: gap(x) for x in within}
     known = dict(sorted(known.items()))
     known |= {x: gap(x) for x in _bottoms(gap, known)}
     nonzero = [(x, known[x]) for x in sorted(known) if known[x] != 0.0]
@@ -51,11 +53,6 @@ def find_flips(gap: Gap, low: float, high: float) -> tuple[float, ...]:
         for (x, at_x), (y, at_y) in pairwise(nonzero)
         if at_x * at_y < 0.0
     )
-
-
-def _beside_zeros(known: dict[float, float]) -> list[float]:
-    """Returns a point in each interval that begins or ends in a zero: the sign within counts."""
-    return [x + 0.382 * (y - x) for x, y in pairwise(known) if known[x] * known[y] == 0.0]
 
 
 def _bottoms(gap: Gap, known: dict[float, float]) -> list[float]:

@@ -41,12 +41,6 @@ def undiscounted(moment: Moment, action: str) -> FloatArray:
     return moment.components(action)[:end] / moment.time_axis.discounts[:end]
 
 
-def told_at(moment: Moment, action: str, component: int) -> float:
-    """Returns what is told of a component: the reward of its step, or what a group is worth now."""
-    told = moment.components(action) if moment.time_axis.width > 1 else undiscounted(moment, action)
-    return float(told[component])
-
-
 def stands_out(moment: Moment, action: str) -> BoolArray:
     """Returns `[K]`: which of the trusted explicit components are more than noise (see `least`)."""
     size = np.abs(undiscounted(moment, action))

@@ -1,12 +1,14 @@
 """What is told of a choice: all of it in sections, and the few sentences that matter most."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from trdlab.explanations.moment import contrast, forecast, outlook, sensitivity
 from trdlab.explanations.moment.moment import CHOICES, Choice
-from trdlab.explanations.moment.together import first_together
 from trdlab.explanations.rules import Claim, Fields, Found, every, first
 from trdlab.explanations.sections import Section, at_first
+
+_FIRST = ("first-reward", "first-expected")
 
 
 def sections(choice: Choice) -> tuple[Section, ...]:
@@ -46,6 +48,28 @@ def _why(choice: Choice) -> str:
     if chances is None or chances[choice.moment.index(choice.action)] > 0.0:
         return f"Why {choice.action}, not {choice.foil}"
     return f"How {choice.action} differs from {choice.foil}"
+
+
+@CHOICES.rule(
+    "With both {action} and {foil}, the first {effect:text}{expected:text} comes {component:when}."
+)
+def first_together(choice: Choice) -> Iterator[Fields]:
+    """Nothing that stands out comes before it; how much it is may differ."""
+    for action, foil in choice.orders[:1]:
+        ones, others = (
+            every(replace(choice, action=name, foil=None), *forecast.firsts)
+            for name in (action, foil)
+        )
+        coming = {(other.kind, other.effect, other.component) for other in others}
+        for one in ones if choice.moment.difference(action, foil).any() else ():
+            if one.kind in _FIRST and (one.kind, one.effect, one.component) in coming:
+                yield {
+                    "action": action,
+                    "foil": foil,
+                    "effect": one.effect,
+                    "expected": "" if one.is_sure else " to expect",
+                    "component": one.component,
+                }
 
 
 @CHOICES.rule("The episode is over here: no action pays anything any more.")

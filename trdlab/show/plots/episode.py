@@ -116,7 +116,8 @@ def _handles(played: Played) -> list[Patch]:
 
 def _plot_expected(ax: Axes, told: Story, trust: Trust | None) -> None:
     axis, expected = told.played.episode.time_axis, told.played.episode.predicted  # [T, N+1]
-    horizon, top = axis.horizon, _residual_row(axis.horizon)
+    horizon = axis.horizon
+    top = horizon + max(0.5, 0.04 * horizon) if horizon else 0.0  # the residual, apart from others
     low, high = _limits(expected)
     how: dict[str, Any] = {"cmap": _COLOURS if low < 0.0 else _REWARDS, "vmin": low, "vmax": high}
     blocks = [(expected[:, -1:], top)] + ([(expected[:, :-1], 0.0)] if horizon else [])
@@ -191,8 +192,3 @@ def _extend(expected: FloatArray) -> Any:
     ends = expected[:, -1].min() < low - _HARDLY * high, expected[:, -1].max() > high
     names = {(True, True): "both", (True, False): "min", (False, True): "max"}
     return names.get(ends, "neither")
-
-
-def _residual_row(horizon: int) -> float:
-    """Returns where the residual stands: above the explicit components, and apart from them."""
-    return horizon + max(0.5, 0.04 * horizon) if horizon else 0.0

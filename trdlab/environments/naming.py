@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-
 _KNOWN = {
     "CartPole": ("push left", "push right"),
     "MountainCar": ("push left", "no push", "push right"),

@@ -125,6 +125,32 @@ class Outlook:
     survival_reach: int = 0
     reach: Mapping[str, int] = field(default_factory=dict)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all parts, events and amounts."""
+        return (*self.parts, *self.events, *self.amounts)
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """The names of those of which nothing can be told."""
+        return tuple(name for name in self.names if not self.reach.get(name))
+
+    def told(self, kind: str, *, together: bool = False) -> dict[str, FloatArray]:
+        """Returns `[..., A, K]` each: as many components, from the first on, as can be told.
+
+        What has none of them is left out.
+
+        Args:
+            kind: `parts`, `events` or `amounts`.
+            together: whether only components count that can be told of all of them.
+        """
+        of: Mapping[str, FloatArray] = getattr(self, kind)
+        reach = {name: self.reach.get(name, 0) for name in of}
+        if together:
+            reach = dict.fromkeys(reach, min(reach.values(), default=0))
+        cut = {name: of[name][..., :count] for name, count in reach.items() if count}
+        return {name: array.astype(np.float64) for name, array in cut.items()}
+
     def __getitem__(self, index: Any) -> "Outlook":
         """Selects states and actions; the time axis stays whole."""
 

@@ -7,6 +7,9 @@ from itertools import pairwise
 _SMALLEST_FIXED = 1e-4
 _LARGEST_FIXED = 1e7
 
+DOUBT = 0.05
+"""Chances that were learned are not told nearer to 0 or 1."""
+
 
 def decimals_for(values: Iterable[float]) -> int:
     """Returns the decimals at which a group of numbers is read: two, or more if many are small.
@@ -101,6 +104,15 @@ def said(value: float, digits: int = 3) -> str:
     return _bare(f"{value:.{decimals}f}")
 
 
+def signed(value: float) -> str:
+    """Returns what something adds, to two digits.
+
+    >>> signed(2.713), signed(-0.8), signed(0.0)
+    ('+2.7', '-0.8', '0')
+    """
+    return "+" * (value > 0.0) + said(value, 2)
+
+
 def digits_to_tell(values: Iterable[float], least: int = 3) -> int:
     """Returns the significant digits at which different numbers look different (at most 15).
 
@@ -141,6 +153,29 @@ def percent(share: float) -> str:
         if share in (0.0, 1.0) or float(text) not in (0.0, 100.0):
             break
     return text
+
+
+def chance_of(share: float) -> str:
+    """Returns a chance with its article.
+
+    >>> chance_of(0.05), chance_of(0.08), chance_of(0.11), chance_of(0.803)
+    ('a 5 % chance', 'an 8 % chance', 'an 11 % chance', 'an 80 % chance')
+    """
+    number = percent(share)
+    is_eight = number.startswith("8") or number.partition(".")[0] in ("11", "18")
+    return f"{'an' if is_eight else 'a'} {number} % chance"
+
+
+def likely(chance: float) -> str:
+    """Returns a chance that was learned, which is never as good as sure.
+
+    >>> likely(0.153), likely(0.997), likely(0.0)
+    ('about a 15 % chance', 'a chance of about 95 % or more', 'a chance of about 5 % or less')
+    """
+    if not DOUBT <= chance <= 1.0 - DOUBT:
+        end = f"{percent(DOUBT)} % or less" if chance < 0.5 else f"{percent(1.0 - DOUBT)} % or more"
+        return f"a chance of about {end}"
+    return f"about {chance_of(chance)}"
 
 
 def significant(value: float, digits: int = 5) -> str:

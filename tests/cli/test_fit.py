@@ -149,6 +149,15 @@ def test_a_fit_that_was_stopped_while_it_played_begins_again(tmp_path):
     assert trdlab.fit("gridworld:ledge", out=path, **QUICK).is_fitted  # type: ignore[arg-type]
 
 
+def test_a_fit_is_listed_with_runs_and_is_none(kept: Path, capsys):
+    code, out, _ = run(capsys, "runs", kept.parent)
+    assert code == 0
+    assert re.search(r"ledge +gridworld:ledge +3 +1 +4000 +a fit, \d+ updates", out)
+    code, _, err = run(capsys, "evaluate", kept)
+    assert code == 2
+    assert f"is a fit, and no training run. Its agent is played by: trdlab agent {kept}" in err
+
+
 def test_what_was_given_in_python_goes_on_in_python(tmp_path, capsys):
     asked = iter([False, False, True])  # twice while it plays
     given = {"fell": lambda step: step.terminated}

@@ -180,7 +180,7 @@ def test_options_of_every_type_and_which_of_preset_file_and_option_wins(trdlab, 
         (["gym", "CartPole-v2"], "no environment 'CartPole-v2'. Did you mean 'CartPole-v1'?"),
         (["gym", "cartpole-v1"], "Did you mean 'CartPole-v1'?"),
         (["gym", "nowhere:X-v0"], "nowhere:X-v0 cannot be imported: No module named 'nowhere'."),
-        (["gym", "Pendulum-v1"], "use an environment with a Discrete one."),
+        (["gym", "Pendulum-v1"], "Name a few actions to choose from: gymnasium."),
         (["gym", "ALE/Breakout-v5"], "is an Atari game. Use: trdlab train atari ALE/Breakout-v5"),
         (["atari", "Brekout"], "no Atari game 'Brekout'. Did you mean 'Breakout'?"),
         (

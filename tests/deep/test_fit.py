@@ -1,5 +1,7 @@
 """A frozen policy's decomposition, fitted to what it did, against answers that are exact."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from trdlab.deep.fit import Fit
 from trdlab.deep.fit_settings import FitSettings
 from trdlab.environments import GymEnvironments
 from trdlab.environments.outcomes import Outcomes
-from trdlab.errors import InputError
+from trdlab.errors import InputError, TrdlabError
 from trdlab.estimator import Future
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
@@ -35,7 +37,7 @@ def experience(rewards: list[float], until: list[int], *, ended: bool = True) ->
     ends = np.zeros(count, dtype=np.bool_)
     ends[count - 2] = ended
     return Experience(
-        observations=np.arange(count),
+        frames=np.arange(count),
         probabilities=np.full((count, 2), 0.5),
         actions=np.zeros(count, dtype=np.int64),
         rewards=np.array([*rewards, 0.0]),
@@ -146,7 +148,7 @@ def played(*, steps: int = 40_000, share: float = 0.2, pause: int = 0, seed: int
 
 def test_actions_are_forced_as_often_as_asked_for_and_cover_what_the_policy_never_does():
     of = played(steps=20_000)
-    at_one = of.steps[of.observations[of.steps] == 1]
+    at_one = of.steps[of.frames[of.steps] == 1]
     back = (of.actions[at_one] == 0).mean()
     assert 0.08 < back < 0.12, "a fifth is forced, half of that goes back"
     assert (of.last[of.steps] > of.steps).all()
@@ -299,6 +301,69 @@ def test_a_fitted_agent_acts_as_before_and_is_explained():
     assert fitted.estimator.future.policy == "the agent's own policy"
     page = str(trdlab.explain(fitted, episodes=20))
     assert "ledge · step 0 of the episode with seed 0" in page
+
+
+class Lamps(gym.Env):
+    """Grey pictures that show how many steps were taken; each pays 1, and the fifth is the last."""
+
+    observation_space = gym.spaces.Box(0, 255, (36, 36), np.uint8)
+    action_space = gym.spaces.Discrete(2)
+
+    def seen(self) -> np.ndarray:
+        return np.full((36, 36), 50 * self.steps, dtype=np.uint8)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.steps = 0
+        return self.seen(), {}
+
+    def step(self, action):
+        self.steps += 1
+        return self.seen(), 1.0, self.steps == 5, False, {}
+
+
+def pictures(steps: int = 40) -> Experience:
+    return gather(
+        lambda count, seed: GymEnvironments(Lamps, count, seed=seed),
+        Memoryless(lambda seen: np.tile([0.5, 0.5], (len(seen), 1))),
+        FUTURE,
+        steps=steps,
+        share=0.0,
+        num_envs=2,
+        seed=0,
+    )
+
+
+def test_of_pictures_each_frame_is_kept_once():
+    of = pictures()
+    assert of.frames.shape[1:] == (36, 36)
+    stacked = replace(of, stack=3)
+    assert (stacked.seen(np.array([0, 1, 4]))[:, :, 0, 0] // 50).tolist() == [
+        [0, 0, 0],
+        [0, 0, 1],
+        [2, 3, 4],
+    ]
+    assert (stacked.seen(np.array([6]))[:, :, 0, 0] // 50).tolist() == [[0, 0, 0]], "a new episode"
+    dark = replace(of, frames=of.frames + 1, stack=3, padding="zero")
+    assert (dark.seen(np.array([7]))[:, :, 0, 0]).tolist() == [[0, 1, 51]]
+
+
+def test_a_fit_reads_pictures():
+    of = pictures(100)
+    space = gym.spaces.Box(0, 255, (1, 36, 36), np.uint8)
+    how = FitSettings(most_updates=200, check_every=50, batch_size=32)
+    fit = Fit(of, space, TimeAxis(0.9, 2), how)
+    while not fit.done:
+        fit.learn()
+    last = fit.estimator(FUTURE).decompose(of.seen(np.array([0, 4]))).components
+    np.testing.assert_allclose(last[..., 0], 1.0, atol=0.05)
+    np.testing.assert_allclose(last[:, 0, 1], [0.9, 0.0], atol=0.1)
+
+
+def test_what_does_not_fit_into_memory_is_refused(monkeypatch):
+    monkeypatch.setattr("trdlab.deep.experience.available_memory", lambda: 1_000_000)
+    with pytest.raises(TrdlabError, match=r"1,000,000 steps take about .* GB.* Play at most"):
+        pictures(1_000_000)
 
 
 def test_forbidden_actions_are_not_forced_either():

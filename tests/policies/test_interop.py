@@ -277,7 +277,7 @@ def test_what_the_environment_normalises_is_normalised(tmp_path):
     inside.save(tmp_path / "a.pkl")
     read = trdlab.agent(f"{tmp_path}/a.zip,normalize={tmp_path}/a.pkl", env="CartPole-v1")
     np.testing.assert_allclose(ask(read.policy, seen)[0], told, rtol=1e-5)
-    assert repr(agent) == "<Agent: PPO · not fitted · action 0, action 1>"
+    assert repr(agent) == "<Agent: PPO · not fitted · push left, push right>"
     unit = np.sqrt(inside.ret_rms.var + inside.epsilon)
     assert not 0.9 < unit < 1.1
     with torch.no_grad():

@@ -1,6 +1,7 @@
 """An explained agent: its sentences in their sections, as plain data, and drawn."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from trdlab.agents import gridworld_agent
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
+from trdlab.estimator import Outlook
 from trdlab.explanations import assess, explain
 from trdlab.explanations.calibration.claims import REPORTS
 from trdlab.explanations.episode.played import EPISODES
@@ -158,7 +160,40 @@ def test_pictures_are_named_by_what_they_show(tmp_path):
         "contrast-seed-3-step-7.png",
         "episode-seed-3.png",
         "calibration.png",
+        "outcomes-seed-3-step-7.png",
     ]
+    (only,) = picture_paths(tmp_path, ("episode",), seed=3, step=7)
+    assert only == "episode"
+
+
+def test_outcomes_are_told_and_drawn_only_where_there_are_some():
+    plain = explained(parts=("forecast", "contrast"), step=1)
+    assert part_figure(plain, "outcomes") is None
+    assert plain.choice is not None
+    rows, reach = plain.choice.moment.decomposition.components, {"coin": 4, "crash": 4}
+    learned = Outlook(
+        variance=np.full((4, 4), np.nan),  # JSON has no such number
+        survival=np.ones((4, 5)),
+        chances={},
+        parts={"coin": rows},
+        events={"crash": np.full((4, 4), 0.25)},
+        amounts={},
+        reach=reach,
+    )
+    choice = replace(plain.choice, moment=replace(plain.choice.moment, outlook=learned))
+    asked = replace(plain, choice=choice, parts=())
+    assert part_figure(asked, "outcomes") is not None
+    names = [section.name for section in asked.sections]
+    assert names[names.index("forecast") + 1] == "outcomes"
+    told = [claim.kind for claim in asked.answer]
+    assert sum(kind in ("decides", "differs", "made-of") for kind in told) == 1
+    assert all(read(claim.sentence, asked) for claim in asked.answer)
+    data = json.loads(json.dumps(asked.to_dict(), allow_nan=False))
+    own = data["moment"]["actions"][choice.action]["outlook"]
+    assert own["events"] == {"crash": [0.25] * 4}
+    assert (own["reach"], own["survival_reach"], own["variance"]) == (reach, 0, [None] * 4)
+    only = [section.name for section in replace(asked, parts=("forecast",)).sections]
+    assert only == ["forecast", "outcomes", "context"]
 
 
 def test_parts_are_named():

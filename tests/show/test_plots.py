@@ -26,7 +26,7 @@ from moments import calibrated
 from trdlab.agents import gridworld_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, OutputError
-from trdlab.estimator import Future
+from trdlab.estimator import Future, Outlook
 from trdlab.explanations import Explanation, explain, solve_state
 from trdlab.explanations.moment.exact import tabular_moment
 from trdlab.explanations.moment.moment import Choice, Moment, Uncertainty
@@ -44,6 +44,7 @@ from trdlab.show.plots.moment import (
     whiskers,
     without_noise,
 )
+from trdlab.show.plots.outcomes import outcomes_figure
 from trdlab.show.plots.style import action_colours
 from trdlab.tabular import exact
 from trdlab.tabular.toytext import make_world
@@ -59,6 +60,18 @@ def moment(rows: object, axis: TimeAxis = AXIS, **known: object) -> Moment:
 OFF_BY = [0.2, 0.3, np.nan, 0.0]
 UNJUDGED = moment([[0.1, 0.5, 0.2, 0.0], [0.3, 0.4, 0.2, 0.1]])
 LEARNED = replace(UNJUDGED, calibration=calibrated(AXIS, off_by=OFF_BY))
+MADE_OF = {"coin": [[0.3, 0.9, 0.2, 0.4], [0.4, 0.4, 0.2, 0.1]],
+           "a life that was lost": [[-0.2, -0.4, 0.0, -0.4], [-0.1, 0.0, 0.0, 0.0]]}  # fmt: skip
+OUTLOOK = Outlook(
+    variance=np.zeros((2, 3)),
+    survival=np.array([[1.0, 0.8, 0.4, 0.2], [1.0, 0.9, 0.9, 0.9]]),
+    chances={},
+    parts={name: np.array(rows) for name, rows in MADE_OF.items()},
+    events={"crash": np.array([[0.1, 0.4, 0.2], [0.0, 0.0, 0.6]])},
+    amounts={"fuel": np.array([[3.0, 2.0, 1.0, 9.0], [1.0, 1.0, 1.0, 1.0]])},
+    survival_reach=2,
+    reach={"coin": 3, "a life that was lost": 1, "crash": 2},
+)
 
 
 @cache
@@ -252,6 +265,44 @@ def test_what_is_bad_and_what_is_not_tested_stand_on_different_ground():
     assert {"no better than a guess", "open, or not tested"} <= set(labels)
 
 
+# ---- outcomes ------------------------------------------------------------------------------------
+
+
+def test_parts_are_stacked_to_the_components_of_the_reward():
+    figure = outcomes_figure(Choice(UNJUDGED, "go", "stay"), OUTLOOK)
+    *_, go, stay = figure.axes
+    assert go.get_ylim() == stay.get_ylim()
+    for row, ax in enumerate((go, stay)):
+        coin, lost = (np.array(rows)[row] for rows in MADE_OF.values())
+        tops = [[bar.get_height() for bar in stack] for stack in ax.containers]
+        np.testing.assert_allclose(np.max(tops, axis=0), coin)
+        np.testing.assert_allclose(np.min(tops, axis=0), lost)
+        np.testing.assert_allclose(
+            np.asarray(ax.lines[-1].get_ydata(), float), UNJUDGED.components(("go", "stay")[row])
+        )
+
+
+def test_action_and_foil_stand_side_by_side_and_what_cannot_be_told_is_veiled():
+    figure = outcomes_figure(Choice(UNJUDGED, "go", "stay"), OUTLOOK)
+    crash, fuel, go, _ = figure.axes
+    for ax, rows in ((crash, OUTLOOK.events["crash"]), (fuel, OUTLOOK.amounts["fuel"])):
+        for row, at in zip(rows, (0, 2), strict=True):  # what is above zero, and below
+            drawn = [bar.get_height() for bar in ax.containers[at]]
+            np.testing.assert_allclose(drawn[: len(row)], row)
+    begins = [ax.patches[-1].get_x() for ax in (crash, fuel, go)]
+    assert begins == [1.5, -0.5, 0.5], "crash is told to t+1, fuel not at all, all parts at t"
+    alone = outcomes_figure(Choice(UNJUDGED, "go", None), OUTLOOK)
+    assert len(alone.axes) == 3
+
+
+def test_survival_that_was_learned_is_drawn_as_far_as_it_can_be_told():
+    learned = replace(LEARNED, outlook=OUTLOOK)
+    action, right = moment_figure(Choice(learned, "go", None)).axes
+    (line,) = right.lines
+    np.testing.assert_array_equal(np.asarray(line.get_ydata()), [1.0, 0.8, 0.4, np.nan])
+    assert not action.patch.get_visible(), "the line can be seen behind the bars"
+
+
 # ---- the page ------------------------------------------------------------------------------------
 
 
@@ -259,7 +310,9 @@ def test_what_is_bad_and_what_is_not_tested_stand_on_different_ground():
 def figures() -> list[Figure]:
     found = explained()
     parts = [explanation_figure(found, part) for part in ("contrast", "episode", "calibration")]
-    return [*map(solved_figure, solved().values()), *parts]
+    learned = replace(LEARNED, outlook=OUTLOOK)
+    outcomes = outcomes_figure(Choice(learned, "go", "stay"), OUTLOOK, "what else there is")
+    return [*map(solved_figure, solved().values()), *parts, outcomes]
 
 
 def texts(figure: Figure) -> list[Text]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,10 +11,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.deep.memory import available_memory
 from trdlab.environments import Environments, NotParallel
 from trdlab.environments.batches import Make
 from trdlab.environments.outcomes import Outcomes
-from trdlab.errors import InputError
+from trdlab.environments.protocol import Padding
+from trdlab.errors import InputError, TrdlabError
 from trdlab.estimator import Future
 from trdlab.policies import Policy
 from trdlab.rollouts.playing import Playing, any_actions
@@ -30,7 +32,7 @@ class Experience:
     """Episodes one after another, in M rows; the last row of each is what was seen after it.
 
     Args:
-        observations: `[M, ...]`.
+        frames: `[M, ...]`, the newest of what was seen.
         probabilities: `[M, A]`, of each action under the policy.
         actions: `[M]`; of no moment in a last row, nor are the rewards.
         rewards: `[M]`, as the future counts them.
@@ -41,9 +43,11 @@ class Experience:
             It can lie beyond the last row, so that what is left out because of it does not depend
             on whether an episode had ended by then.
         last: `[M]`, the number of the last row of the same episode.
+        stack: how many frames an observation holds; None where it is one frame.
+        padding: what stands in a stack before the first frame (see `ReplayBuffer`).
     """
 
-    observations: NDArray[Any]
+    frames: NDArray[Any]
     probabilities: FloatArray
     actions: IntArray
     rewards: FloatArray
@@ -51,6 +55,8 @@ class Experience:
     ends: BoolArray
     until: IntArray
     last: IntArray
+    stack: int | None = None
+    padding: Padding = "reset"
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -59,6 +65,22 @@ class Experience:
     def steps(self) -> IntArray:
         """The rows in which something was done."""
         return np.flatnonzero(np.arange(len(self)) < self.last)
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Its arrays, by name."""
+        return {name: of for name, of in vars(self).items() if name in _COLUMNS}
+
+    def seen(self, rows: IntArray) -> NDArray[Any]:
+        """Returns the observations in some rows: `[K, ...]`, or stacks `[K, k, ...]`."""
+        if self.stack is None:
+            return self.frames[rows]
+        first = np.searchsorted(self.last, self.last[rows])[:, None]  # [K, 1], rows
+        at = rows[:, None] - np.arange(self.stack)[::-1]  # [K, k]
+        stacks: NDArray[Any] = self.frames[np.maximum(at, first)]
+        if self.padding == "zero":
+            stacks[at < first] = 0
+        return stacks
 
     @cached_property
     def next_end(self) -> IntArray:
@@ -92,6 +114,9 @@ class Experience:
         came = windows[:, rows] * discounts.astype(groups.dtype)  # [C, K, L]
         follows = np.minimum(rows + span * w, last)
         return Ahead(came.swapaxes(0, 1), span, over, follows, own)
+
+
+_COLUMNS = [of.name for of in fields(Experience) if of.name not in ("stack", "padding")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +212,7 @@ def gather(
     Raises:
         InputError: there is no step, the share is outside [0, 1], or an outcome is no number or
             was never there.
+        TrdlabError: so many steps do not fit into what is free.
     """
     if steps < 1 or not 0.0 <= share <= 1.0:
         raise InputError(
@@ -201,13 +227,27 @@ def gather(
             playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
             parts.append(_played(playing, future, share, pause, rng, read))
         taken, batch = taken + len(parts[-1].steps), batch + 1
+        if batch == 1:
+            _check_memory(parts[0], taken, steps)
         tell(taken)
     read.check_seen()
     starts = np.repeat(np.cumsum([0, *map(len, parts[:-1])]), [len(part) for part in parts])
-    names = (of.name for of in fields(Experience))
-    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in _COLUMNS}
     moved = {name: columns[name] + starts for name in ("until", "last")}
-    return Experience(**columns | moved)
+    return replace(parts[0], **columns | moved)
+
+
+def _check_memory(first: Experience, taken: int, steps: int) -> None:
+    """Refuses more steps than fit, as far as the first episodes tell; they are copied once."""
+    free = available_memory()
+    each = 2 * sum(column.nbytes for column in first.columns.values()) / taken
+    if free is not None and each * steps > 0.9 * free:
+        fits = int(0.9 * free / each)
+        raise TrdlabError(
+            f"{steps:,} steps take about {each * steps / 1e9:.2f} GB, and {free / 1e9:.2f} GB is "
+            "free.",
+            f"Play at most {fits:,}, or free some memory.",
+        )
 
 
 def _some(make: Make, num_envs: int, seed: int) -> Environments:
@@ -232,7 +272,7 @@ def _played(
     free = np.zeros(count, dtype=np.int64)  # [B], from which step on an action may be forced
     coin = np.zeros(count, dtype=np.int64)  # [B], the step at which the next one would have been
     while playing.running.any():
-        running, seen, turn = playing.running, playing.stack.observations, playing.turn()
+        running, seen, turn = playing.running, playing.stack.newest, playing.turn()
         seen = seen[running]  # a copy: what is seen changes with the step
         forced = running & (rng.random(count) < share) & (playing.steps >= free)
         free = np.where(forced, playing.steps + 1 + pause, free)
@@ -250,7 +290,9 @@ def _played(
             coin[over] = np.maximum(playing.steps, free[over]) + wait
             none, nothing = np.zeros(len(over), dtype=np.bool_), np.zeros((len(over), 1))
             done = (none.astype(np.int64), nothing[:, 0], nothing.repeat(read.shape[1], axis=1))
-            log.append((over, *playing.last_seen(), *done, none, none))
+            whole, likely = playing.last_seen()
+            newest = whole[:, -1] if playing.stack.size else whole
+            log.append((over, newest, likely, *done, none, none))
     episode, *columns = (np.concatenate(column) for column in zip(*log, strict=True))
     order, lengths = np.argsort(episode, kind="stable"), np.bincount(episode)
     *columns, were_forced = (column[order] for column in columns)
@@ -261,4 +303,5 @@ def _played(
     own = None if future.time_limit_ends else playing.environments.time_limit
     limits = [limit for limit in (own, playing.max_steps) if limit is not None]
     until = np.minimum(until, first + min(limits, default=_NEVER))
-    return Experience(*(*columns, until, last))
+    told: dict[str, Any] = dict(zip(_COLUMNS, (*columns, until, last), strict=True))
+    return Experience(**told, stack=playing.stack.size, padding=playing.stack.padding)

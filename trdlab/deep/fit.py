@@ -88,7 +88,7 @@ class Fit:
         ends = np.array([np.minimum(paid.min(axis=0), 0.0), np.maximum(paid.max(axis=0), 0.0)])
         most = np.append(np.ones(axis.horizon), 1.0 / (1.0 - axis.gamma**axis.width))
         self.possible = ends[..., None] * (axis.discounts * most)  # [2, C, N+1]
-        _standardise(self.network, experience.observations[self._learned])
+        _standardise(self.network, experience.frames[self._learned])
         self.target_network = deepcopy(self.network)
         self.optimizer = torch.optim.Adam(
             self.network.parameters(), lr=self._learning_rate, fused=True
@@ -231,7 +231,7 @@ class Fit:
         return np.concatenate(parts)
 
     def _components(self, network: DecompositionNetwork, rows: IntArray) -> torch.Tensor:
-        told: torch.Tensor = network(torch.from_numpy(self.experience.observations[rows]))
+        told: torch.Tensor = network(torch.from_numpy(self.experience.seen(rows)))
         shape = (len(rows), self.num_actions, len(self.channels), self.axis.num_components)
         return told.reshape(shape)  # [K, A, C, N+1]
 

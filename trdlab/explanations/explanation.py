@@ -18,7 +18,7 @@ from trdlab.explanations.calibration import claims as calibration
 from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import Story, tell
-from trdlab.explanations.moment import outcome, telling
+from trdlab.explanations.moment import outcome, outlook, telling
 from trdlab.explanations.moment.moment import Choice
 from trdlab.explanations.moment.outcome import Trial
 from trdlab.explanations.rules import Claim
@@ -31,8 +31,8 @@ Part = Literal["forecast", "contrast", "episode", "calibration"]
 PARTS: tuple[Part, ...] = get_args(Part)
 
 _OF_PART: dict[Part, tuple[str, ...]] = {
-    "forecast": ("forecast", "context"),
-    "contrast": ("contrast", "flips", "trial", "context"),
+    "forecast": ("forecast", "outcomes", "context"),
+    "contrast": ("contrast", "flips", "differences", "trial", "context"),
     "episode": ("episode",),
     "calibration": ("score", "trust", "faults", "later", "others", "critic", "judged"),
 }
@@ -79,9 +79,11 @@ class Explanation(Printable):
         """The few sentences that matter most: how it does, what it expects, how far to trust it."""
         moment = [] if self.choice is None else telling.in_brief(self.choice)
         tried = [] if self.trial is None else outcome.in_brief(self.trial)
+        asked = [] if self.choice is None else outlook.in_brief(self.choice)  # by the user
         trust = [] if self.report is None else calibration.in_brief(self.report)
         surprise = [] if self.story is None or self.story.most is None else [self.story.most]
-        return at_first([*trust[:1], *moment[:2], *tried[:1], *trust[1:2], *surprise, *moment[2:]])
+        brief = [*trust[:1], *moment[:2], *(asked or tried[:1]), *trust[1:2]]
+        return at_first([*brief, *surprise, *moment[2:]])
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:

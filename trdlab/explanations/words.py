@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 from trdlab.explanations.rules import Form
-from trdlab.formatting import percent, plain, said
+from trdlab.formatting import chance_of, likely, percent, plain, said, signed
 from trdlab.statistics import Estimate
 from trdlab.time_axis import TimeAxis
 
@@ -15,8 +15,10 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
 
     Numbers: `number` (2.71), `size` (2.71, nothing), `gives`, `pays` and `gains` (gives nothing,
     costs 0.5, loses 0.5), `estimate`, `percent`, `chance` (a 5 % chance), `given` (by the user: all
-    its digits), `tenths`, `count`, `steps`, `episodes`, `times`, `states`. What is said
-    where a flag asks for it: `average` and `averages` (unless it is sure), `worth`, `ties`.
+    its digits), `tenths`, `count`, `steps`, `episodes`, `times`, `states`. Of what was learned, to
+    two digits: `likely` (about a 15 % chance), `rough` (2.7), `share` (+2.7), `bill` (coin +2.7,
+    hazard -0.8). What is said where a flag asks for it: `average` and `averages` (unless it is
+    sure), `worth`, `ties`.
     Time, where the action is the first step: `when` (a component: at once, 3 steps later, after the
     first 4 steps), `whens` (several), `span` (from one to another), `within` (up to a step: in the
     first 4 steps), `first` (so many: the first 4 steps), `step` (of an episode).
@@ -54,6 +56,10 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "estimate": Form(_estimate, lambda estimate: float(estimate.value)),
         "percent": _of(lambda share: f"{percent(share)} %"),
         "chance": _of(chance_of),
+        "likely": _of(likely),
+        "rough": _of(lambda x: said(x, 2)),
+        "share": _of(signed),
+        "bill": _of(lambda parts: ", ".join(f"{of} {signed(x)}" for of, x in parts.items())),
         "given": _of(plain),
         "count": _of(lambda count: f"{count:,}"),
         "steps": _of(lambda count: counted(count, "step")),
@@ -115,17 +121,6 @@ def whens_of(axis: TimeAxis, components: Sequence[int]) -> list[str]:
 
 def _first(count: int) -> str:
     return "the first step" if count == 1 else f"the first {count:,} steps"
-
-
-def chance_of(share: float) -> str:
-    """Returns a chance with its article.
-
-    >>> chance_of(0.05), chance_of(0.08), chance_of(0.11), chance_of(0.803)
-    ('a 5 % chance', 'an 8 % chance', 'an 11 % chance', 'an 80 % chance')
-    """
-    number = percent(share)
-    is_eight = number.startswith("8") or number.partition(".")[0] in ("11", "18")
-    return f"{'an' if is_eight else 'a'} {number} % chance"
 
 
 def counted(count: int, noun: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from trdlab.errors import TrdlabError
 from trdlab.runs.checkpoint import checkpoint_steps
-from trdlab.runs.folder import RunFolder, run_paths
+from trdlab.runs.folder import RunFolder, is_fit, run_paths
 from trdlab.runs.lock import holder
 from trdlab.runs.metrics import last_metrics
 
@@ -21,6 +21,7 @@ class RunSummary:
         started: when it began, in ISO 8601.
         metrics: its last line of metrics; empty if there is none yet.
         step: of its newest checkpoint, in agent steps; None if there is none yet.
+        is_fit: whether it is a fit.
         pid: the process that trains it, 0 if its number is not known, None if there is none.
         fault: why the rest is not known; None if all is well.
     """
@@ -30,6 +31,7 @@ class RunSummary:
     started: str | None = None
     metrics: dict[str, Any] = field(default_factory=dict)
     step: int | None = None
+    is_fit: bool = False
     pid: int | None = None
     fault: str | None = None
 
@@ -45,6 +47,7 @@ def _summary(path: Path) -> RunSummary:
         known["pid"] = holder(path)
         run = RunFolder.open(path)
         known |= {"config": run.config, "started": run.manifest.get("started")}
+        known["is_fit"] = is_fit(path)
         known["step"] = max(checkpoint_steps(run), default=None)
         if run.metrics.exists():
             known["metrics"] = last_metrics(run.metrics)

@@ -65,4 +65,5 @@ def _action(moment: Moment, i: int, name: str) -> dict[str, Any]:
         "probability": None if moment.policy is None else float(moment.policy[i]),
         "stays": None if moment.stays is None else moment.stays[i],
         **{of: getattr(known, of)[i].tolist() for of in spread},
+        **({} if moment.outlook is None else {"outlook": plain_data(moment.outlook[i])}),
     }

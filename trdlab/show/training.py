@@ -88,6 +88,11 @@ def _row(run: RunSummary) -> tuple[Row, str]:
     unreadable = (name, "", "", "", "", "", "cannot be read")
     if run.fault:
         return unreadable, run.fault
+    if run.is_fit:
+        cells = [str(run.config.get(of, "")) for of in ("N", "w", "steps")]
+        env = run.config.get("env") or run.config.get("agent", "")
+        status = f"a fit, {run.step or 0:,} updates" if run.pid is None else "fitting"
+        return (name, env, *cells, "", status), ""
     try:
         settings = TrainSettings.from_config(run.config, "Its config.toml")
     except InputError as error:

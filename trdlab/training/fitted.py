@@ -243,12 +243,11 @@ def _restored(folder: RunFolder, make: "Callable[[Experience], Fit]") -> "Fit":
     from trdlab.deep.experience import Experience
 
     checkpoint = load_checkpoint(folder)
-    kinds = checkpoint.state["experience"]
-    columns = {
+    columns: dict[str, Any] = {
         name: np.frombuffer(checkpoint.blocks.get(name, b""), dtype).reshape(shape)
-        for name, (dtype, shape) in kinds.items()
+        for name, (dtype, shape) in checkpoint.state["columns"].items()
     }
-    fitting = make(Experience(**columns))
+    fitting = make(Experience(**columns, **checkpoint.state["stacks"]))
     fitting.load_state_dict(checkpoint.state["learner"])
     return fitting
 
@@ -265,13 +264,11 @@ def _save(
     from trdlab.deep.update import arrays_of
 
     estimator = fitting.estimator(future)
+    played = fitting.experience
     columns = (
         {}
         if done
-        else {
-            field.name: np.ascontiguousarray(getattr(fitting.experience, field.name))
-            for field in fields(fitting.experience)
-        }
+        else {name: np.ascontiguousarray(column) for name, column in played.columns.items()}
     )
     state = {
         "done": done,
@@ -280,7 +277,8 @@ def _save(
         "possible": fitting.possible,
         "reach": list(reach),
         "hidden": [getattr(layer, "out_features", 0) for layer in fitting.network.body.children()],
-        "experience": {name: [of.dtype.str, list(of.shape)] for name, of in columns.items()},
+        "columns": {name: [of.dtype.str, list(of.shape)] for name, of in columns.items()},
+        "stacks": {"stack": played.stack, "padding": played.padding},
         "learner": {} if done else fitting.state_dict(),
     }
     blocks = {name: of.data.cast("B") for name, of in columns.items() if of.size}

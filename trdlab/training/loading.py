@@ -76,8 +76,13 @@ def run_settings(folder: RunFolder) -> TrainSettings:
     """Returns the settings that a run began with.
 
     Raises:
-        InputError: they are no settings, or out of their range.
+        InputError: they are no settings, or out of their range; or it is a fit.
     """
+    if is_fit(folder.path):
+        raise InputError(
+            f"'{folder.path}' is a fit, and no training run.",
+            f"Its agent is played by: trdlab agent {folder.path}",
+        )
     return TrainSettings.from_config(folder.config, f"'{folder.path / 'config.toml'}'")
 
 

@@ -12,7 +12,7 @@ import mutants
 from definitions import holds
 from moments import calibrated, told, trusted
 from trdlab.decomposition import RewardDecomposition, TimeAxis
-from trdlab.estimator import Future
+from trdlab.estimator import Future, Outlook
 from trdlab.explanations.calibration.calibration import Calibration
 from trdlab.explanations.moment.exact import gridworld_moment, tabular_moment
 from trdlab.explanations.moment.moment import CHOICES, Choice, Moment, Uncertainty, WhatIf
@@ -22,6 +22,7 @@ from trdlab.gridworld import Gridworld, load_map, map_names, parse_map
 from trdlab.tabular import exact
 
 NAMES = ("up", "down", "FIRE", "move left")
+PARTS = ("coin", "hazard", "fuel", "life lost", "step", "shaping")
 SYMMETRIC = ("lead to the same", "are worth the same", "are equally good", "difference between")
 WORDS = {
     "more": "fewer",
@@ -58,6 +59,16 @@ WORDS = {
     "above": "below",
     "below": "above",
     "between": "outside",
+    "ends in": "still runs after",
+    "still runs after": "ends in",
+    "or more": "or less",
+    "or less": "or more",
+    "adds up to": "comes",
+    "comes": "adds up to",
+    " times": "",
+    " (discounted)": "",
+    "likeliest": "least likely",
+    "others": "more others",
 }
 
 
@@ -89,6 +100,36 @@ def chancy(draw: st.DrawFn, axis: TimeAxis, rows: list[list[float]], size: float
 
 
 @st.composite
+def outlooks(draw: st.DrawFn, axis: TimeAxis, rows: np.ndarray, size: float) -> Outlook:
+    """What else was learned: parts of `rows [A, N+1]`, events, amounts, and their reach."""
+    shape, horizon = rows.shape, axis.horizon
+    cells = st.sampled_from([0.0, 0.0, 0.02, 0.3, 0.9, -0.5, 1.0])
+
+    def array(columns: int) -> np.ndarray:
+        length = shape[0] * columns
+        drawn = draw(st.lists(cells, min_size=length, max_size=length))
+        return np.array(drawn, dtype=np.float64).reshape(shape[0], columns)
+
+    names = PARTS[: draw(st.sampled_from([0, 1, 2, 6]))]
+    parts = {name: size * array(horizon + 1) for name in names[1:]}
+    parts |= {name: rows - sum(parts.values()) for name in names[:1]}
+    events = {name: array(horizon).clip(min=0.0) for name in ("crash", "life lost")}
+    amounts = {"fuel": size * array(horizon + 1)}
+    reach = {name: draw(st.integers(0, horizon)) for name in (*parts, *events, *amounts)}
+    survival = draw(st.sampled_from([1.0, 0.99, 0.7])) ** np.arange(horizon + 1)
+    return Outlook(
+        variance=np.zeros((shape[0], horizon)),
+        survival=np.broadcast_to(survival, shape),
+        chances={},
+        parts=parts,
+        events=events,
+        amounts=amounts,
+        survival_reach=draw(st.integers(0, horizon)),
+        reach=reach,
+    )
+
+
+@st.composite
 def moments(draw: st.DrawFn) -> Moment:
     """Random moments: repeated, zero and negative components, missing totals, ties, what-ifs."""
     horizon = draw(st.sampled_from([0, 1, 2, 3, 4, 5, 5, 9]))
@@ -104,6 +145,7 @@ def moments(draw: st.DrawFn) -> Moment:
         rows[1] = list(rows[0])
     known = draw(chancy(axis, rows, size)) if gamma >= 0.3 and draw(st.booleans()) else None
     decomposition = RewardDecomposition(np.array(rows), axis)
+    learned = draw(st.none() | outlooks(axis, decomposition.components, size))
     total = st.sampled_from([0.0, 4.0, 4.0, 4.001, np.nan])
     totals = np.array([draw(total) for _ in rows]) if draw(st.booleans()) else None
     slope = size * draw(st.sampled_from([0.0, 0.1, 1.0, 5.0, -1.0, -5.0]))
@@ -124,6 +166,7 @@ def moments(draw: st.DrawFn) -> Moment:
         Future(draw(st.sampled_from(["the optimal policy", "the given policy"]))),
         totals=totals,
         uncertainty=known,
+        outlook=learned,
         tied=draw(st.sampled_from([(), NAMES[:2]])),
         tied_later=draw(st.integers(0, 2)),
         what_ifs=(WhatIf("γ", 0.95, 0.01, 0.99, q_values),),
@@ -240,7 +283,8 @@ def test_a_scaled_model_says_the_same_with_scaled_numbers(moment: Moment, power:
     scale = 10.0**power
 
     def numbers(claim: Claim) -> list[float]:
-        return [of for of in claim.fields.values() if isinstance(of, float)]
+        parts = claim.fields.get("parts", {})
+        return [of for of in (*claim.fields.values(), *parts.values()) if isinstance(of, float)]
 
     def scaled(known: Uncertainty | None) -> Uncertainty | None:
         if known is None:
@@ -251,6 +295,14 @@ def test_a_scaled_model_says_the_same_with_scaled_numbers(moment: Moment, power:
         )
         spread = (known.deviation * scale, known.return_deviation * scale)
         return Uncertainty(*spread, known.survival, outcomes)
+
+    def more(of: Outlook | None) -> Outlook | None:
+        if of is None:
+            return None
+        parts, amounts = (
+            {name: rows * scale for name, rows in told.items()} for told in (of.parts, of.amounts)
+        )
+        return replace(of, parts=parts, amounts=amounts)
 
     def judged(of: Calibration | None) -> Calibration | None:
         if of is None:
@@ -266,6 +318,7 @@ def test_a_scaled_model_says_the_same_with_scaled_numbers(moment: Moment, power:
         "calibration": judged(moment.calibration),
         "foils": judged(moment.foils),
         "uncertainty": scaled(moment.uncertainty),
+        "outlook": more(moment.outlook),
         "what_ifs": (),
     }
     names = moment.action_names[:2]

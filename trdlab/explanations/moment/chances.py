@@ -81,16 +81,24 @@ def either_or(choice: Choice) -> Iterator[Fields]:
             "With {action}, there is {chance:chance} that the episode ends {last_step:within}."
         ),
         "surely-over": "With {action}, the episode ends {last_step:within}.",
+        "learned-over": (
+            "With {action}, there is {chance:likely} that the episode {goes:text} {count:first}."
+        ),
     }
 )
 def over(choice: Choice) -> Iterator[Found]:
-    """The first component at whose beginning the episode has more likely ended than not."""
-    known = choice.moment.uncertainty
-    if known is not None:
-        survival = known.survival[choice.moment.index(choice.action)]
-        below = np.flatnonzero(survival < 0.5)
-        if below.size:
-            last_step = choice.time_axis.start(int(below[0])) - 1
-            chance = 1.0 - float(survival[below[0]])
-            fields = {"action": choice.action, "last_step": last_step, "chance": chance}
-            yield "likely-over" if chance < 1.0 else "surely-over", fields
+    """The first component at whose beginning the episode has more likely ended than not.
+
+    Where that was learned and there is none, how likely the episode still runs at the last: that no
+    reward is coming is something else than that nobody is there to get it.
+    """
+    moment, action = choice.moment, {"action": choice.action}
+    survival = moment.survival(choice.action)
+    i = int((survival < 0.5).argmax()) or len(survival) - 1
+    count, runs, ends = choice.time_axis.start(i), float(survival[i]), 1.0 - float(survival[i])
+    if moment.uncertainty is None and i:
+        goes, chance = ("ends in", ends) if runs < 0.5 else ("still runs after", runs)
+        yield "learned-over", action | {"goes": goes, "count": count, "chance": chance}
+    elif runs < 0.5:
+        kind = "likely-over" if ends < 1.0 else "surely-over"
+        yield kind, action | {"last_step": count - 1, "chance": ends}

@@ -31,7 +31,7 @@ def forecast(choice: Choice) -> list[Claim]:
     """
     end = explicit_end(choice.moment, choice.action)
     if doubtful(choice.moment, choice.action).all():
-        return []
+        return every(choice, *over)  # which has been judged by itself
     chances = every(choice, give_or_take, *over)
     if not choice.moment.components(choice.action)[:end].any():
         return first(choice, *silence) + chances

@@ -168,6 +168,16 @@ class Moment:
         known = self.uncertainty
         return known is not None and not known.deviation[self.index(action), components].any()
 
+    def survival(self, action: str) -> FloatArray:
+        """Returns `[K]`: how likely the episode still runs when components begin, as far as told.
+
+        It runs now; what was learned is told as far as it has proved better than a guess.
+        """
+        i, known, learned = self.index(action), self.uncertainty, self.outlook
+        if known is not None or learned is None:
+            return np.ones(1) if known is None else np.asarray(known.survival[i])
+        return np.asarray(learned.survival[i, : learned.survival_reach + 1])
+
     def difference(self, action: str, foil: str) -> FloatArray:
         """Returns `[N+1]`: action minus foil, exactly 0 where they differ only by rounding."""
         return difference(self.components(action), self.components(foil))

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from trdlab.explanations.moment import contrast, forecast, sensitivity
+from trdlab.explanations.moment import contrast, forecast, outlook, sensitivity
 from trdlab.explanations.moment.moment import CHOICES, Choice
 from trdlab.explanations.rules import Claim, Fields, Found, every, first
 from trdlab.explanations.sections import Section, at_first
@@ -22,6 +22,8 @@ def sections(choice: Choice) -> tuple[Section, ...]:
         Section("contrast", _why(choice), tuple(told)),
         Section("flips", "What would change that", tuple(sensitivity.sensitivity(choice))),
         Section("forecast", f"What to expect of {choice.action}", tuple(forecast.forecast(choice))),
+        Section("outcomes", "What else to expect", tuple(outlook.forecast(choice))),
+        Section("differences", "What else differs", tuple(outlook.contrast(choice))),
         Section("context", "Whose future", tuple(every(choice, *ties, *future))),
     )
     return tuple(part for part in parts if part)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import singledispatch
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from matplotlib.figure import Figure
 
@@ -21,7 +21,10 @@ from trdlab.show.plots.comparison import comparison_figure
 from trdlab.show.plots.episode import story_figure
 from trdlab.show.plots.map import solved_figure, world_figure
 from trdlab.show.plots.moment import moment_figure, possible_range
+from trdlab.show.plots.outcomes import outcomes_figure
 from trdlab.tabular import ExactTable
+
+Picture = Part | Literal["outcomes"]
 
 
 @singledispatch
@@ -52,8 +55,8 @@ def explanation_figure(explained: Explanation, part: Part | None = None) -> Figu
     raise InputError("There is nothing to draw.", "Ask for a part that there is a picture of.")
 
 
-def part_figure(explained: Explanation, part: Part) -> Figure | None:
-    """Returns the picture of a part; None where there is nothing to draw."""
+def part_figure(explained: Explanation, part: Picture) -> Figure | None:
+    """Returns the picture of a part, or of outcomes; None where there is nothing to draw."""
     agent, report, choice = explained.agent, explained.report, explained.choice
     if part == "calibration":
         return None if report is None else trust_figure(report, agent.name)
@@ -61,9 +64,13 @@ def part_figure(explained: Explanation, part: Part) -> Figure | None:
         return None if explained.story is None else _episode(explained, explained.story)
     if choice is None or (part == "contrast" and choice.foil is None):
         return None
+    title = f"{agent.name}, step {explained.step} of the episode with seed {explained.seed}"
+    if part == "outcomes":
+        known = choice.moment.outlook
+        return outcomes_figure(choice, known, title) if known is not None and known.names else None
     return moment_figure(
         choice if part == "contrast" else replace(choice, foil=None),
-        f"{agent.name}, step {explained.step} of the episode with seed {explained.seed}",
+        title,
         trial=explained.trial if part == "contrast" else None,
         possible=possible_range(agent.estimator),
     )
@@ -71,11 +78,16 @@ def part_figure(explained: Explanation, part: Part) -> Figure | None:
 
 def picture_paths(
     folder: Path, parts: tuple[Part, ...], *, seed: int, step: int
-) -> dict[Part, Path]:
-    """Returns where the picture of each part goes; of all parts where none was asked for."""
+) -> dict[Picture, Path]:
+    """Returns where the picture of each part goes; of all parts where none was asked for.
+
+    Outcomes belong to a moment: theirs is among those of a forecast or a contrast.
+    """
     ending = {"episode": f"-seed-{seed}", "calibration": ""}
     moment = f"-seed-{seed}-step-{step}"
-    return {part: folder / f"{part}{ending.get(part, moment)}.png" for part in parts or PARTS}
+    names: list[Picture] = [*(parts or PARTS)]
+    names += ["outcomes"] * bool({"forecast", "contrast"} & set(names))
+    return {name: folder / f"{name}{ending.get(name, moment)}.png" for name in names}
 
 
 def _episode(explained: Explanation, told: Story) -> Figure:

@@ -94,12 +94,11 @@ def plot_action(
     scale = scale_of(components[None], ends) if scale is None else scale
     colour = style.action_colours(moment.action_names)[action]
     plot_components(ax, components, moment.time_axis, colour=colour, scale=scale)
-    style.draw_grounds(ax, style.positions(moment.time_axis), _doubts(moment, action))
+    places, chance = style.positions(moment.time_axis), _survival(moment, action)
     if ends is not None:
-        bars.draw_whiskers(ax, style.positions(moment.time_axis), ends, scale)
-    chance = _survival(moment, action)
-    if (chance < 1.0).any():
-        _plot_survival(ax, style.positions(moment.time_axis), chance)
+        bars.draw_whiskers(ax, places, ends, scale)
+    behind = _plot_survival(ax, places, chance) if (chance < 1.0).any() else ax
+    style.draw_grounds(behind, places, _doubts(moment, action))
     return ax
 
 
@@ -179,13 +178,14 @@ def _title(ax: Axes, text: str, components: FloatArray) -> None:
 
 
 def _survival(moment: Moment, action: str) -> FloatArray:
-    """Returns `[N+1]`: the chance that the episode still runs, 1 where it is not known."""
-    if moment.uncertainty is None:
-        return np.ones(moment.time_axis.num_components)
-    return np.asarray(moment.uncertainty.survival[moment.index(action)])
+    """Returns `[N+1]`: the chance that the episode still runs, NaN where it is not known."""
+    known, chance = moment.survival(action), np.full(moment.time_axis.num_components, np.nan)
+    chance[: len(known)] = known
+    return chance
 
 
-def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:
+def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> Axes:
+    """Draws it on axes behind `ax`, which are returned: what is on the ground lies there, too."""
     right = ax.twinx()
     right.step(places, chance, where="mid", color=style.MUTED, linewidth=1.2, linestyle=":")
     right.set(ylim=(-0.08, 1.2), yticks=(0.0, 0.5, 1.0), yticklabels=("0", "½", "1"))
@@ -193,6 +193,7 @@ def _plot_survival(ax: Axes, places: FloatArray, chance: FloatArray) -> None:
     right.spines[["left", "bottom"]].set_visible(False)
     ax.set_zorder(right.get_zorder() + 1)  # the bars stand in front of it
     ax.patch.set_visible(False)
+    return right
 
 
 def _doubts(moment: Moment, *actions: str) -> list[Status | None]:

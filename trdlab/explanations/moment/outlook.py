@@ -1,0 +1,151 @@
+"""Outlook: what else was learned to be expected: what happens, and what the reward is made of.
+
+Each is told as far as its forecasts have proved better than a guess, and no further.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from trdlab.arrays import FloatArray
+from trdlab.explanations.moment.contrast import untested_difference
+from trdlab.explanations.moment.leads import NOISE
+from trdlab.explanations.moment.moment import CHOICES, Choice
+from trdlab.explanations.moment.steps import LEAST_DISCOUNT, SHARE
+from trdlab.explanations.rules import Claim, Fields, Found, every
+from trdlab.formatting import DOUBT
+
+_MOST_PARTS = 4  # that are named
+_SEEN = 0.02  # of all parts: what is less cannot be seen in two digits
+_MOST = 0.5  # of all that differs: a part that makes more of it decides
+_PEAK = 2.0  # times the mean of all other chances: what is likelier than that has a time
+
+
+def forecast(choice: Choice) -> list[Claim]:
+    """Returns what else is expected of an action, and what cannot be told."""
+    return every(choice, *made_of, *outcomes[:-1], untold)
+
+
+def contrast(choice: Choice) -> list[Claim]:
+    """Returns what else is expected otherwise of its foil, if differences are to be trusted."""
+    return [] if every(choice, untested_difference) else every(choice, decides, outcomes[-1])
+
+
+def in_brief(choice: Choice) -> list[Claim]:
+    """Returns the one finding that matters most, where outcomes were asked for."""
+    return (contrast(choice) + forecast(choice))[:1]
+
+
+@CHOICES.kinds(
+    {
+        "made-of": "{last_step:within} {action} brings {total:share} on average: {parts:bill}.",
+        "part-alone": (
+            "With {action}, {total:share} is expected from {outcome:text} {last_step:within}."
+        ),
+    }
+)
+def made_of(choice: Choice) -> Iterator[Found]:
+    """What the reward is made of, as far as all parts can be told, and those that go further."""
+    together = [*_told(choice, "parts", together=True)]
+    common = together[0][1] if together else -1
+    sums = {part: float(row.sum()) for part, _, (row, *_) in together}
+    ordered = sorted(sums, key=lambda part: -abs(sums[part]))
+    named, others = ordered[:_MOST_PARTS], ordered[_MOST_PARTS:]
+    parts = {part: sums[part] for part in named}
+    parts |= {f"{len(others)} others": sum(sums[part] for part in others)} if others else {}
+    least = _SEEN * sum(map(abs, sums.values()))
+    if parts := {part: total for part, total in parts.items() if abs(total) > least}:
+        about = {"action": choice.action, "last_step": common, "total": sum(sums.values())}
+        yield "made-of", about | {"parts": parts}
+    for part, last_step, (row, *_) in _told(choice, "parts"):
+        if last_step > common and row.any():
+            about = {"action": choice.action, "last_step": last_step, "total": float(row.sum())}
+            yield "part-alone", about | {"outcome": part}
+
+
+@CHOICES.rule(
+    "{last_step:within}, most of the difference is {outcome:text}: on average {total:share} with "
+    "{action} and {other:share} with {foil}."
+)
+def decides(choice: Choice) -> Iterator[Fields]:
+    """One part makes more than half of what the parts differ by, and that is no noise."""
+    told = [*_told(choice, "parts", together=True)]
+    for action, foil in choice.orders[:1] if told else ():
+        sums = np.stack([rows.sum(axis=1) for *_, rows in told])  # [P, 2]
+        apart, size = np.ptp(sums, axis=1), np.abs(sums).sum(axis=0).max()
+        lead = np.abs(choice.moment.lead(action, foil)).max()
+        i = int(apart.argmax())
+        if apart[i] > max(_MOST * apart.sum(), SHARE * size, NOISE * lead):
+            about = {"action": action, "foil": foil, "outcome": told[i][0]}
+            total, other = sums[i].tolist()
+            yield about | {"last_step": told[i][1], "total": total, "other": other}
+
+
+@CHOICES.kinds(
+    {
+        "chance-of": (
+            "With {action}, there is {chance:likely} of {outcome:text} {last_step:within}."
+        ),
+        "likeliest": (
+            "Within {count:first} of {action}, {outcome:text} is likeliest {component:when}: "
+            "{chance:likely}."
+        ),
+        "counted": (
+            "With {action}, {outcome:text} {comes:text} {total:rough}{unit:text} "
+            "{last_step:within}, on average."
+        ),
+        "differs": (
+            "{last_step:within}, {outcome:text} {comes:text} {total:rough}{unit:text} with "
+            "{action} and {other:rough}{unit:text} with {foil}, on average."
+        ),
+    }
+)
+def outcomes(choice: Choice) -> Iterator[Found]:
+    """When an event is likeliest, or how often it comes; how much an amount adds up to.
+
+    The chance that an event comes at all is that of the only component that can be told, or at most
+    all chances together, if that is little. A group of steps counts once. Amounts are discounted
+    only with w > 1. What differs from the foil is no noise.
+    """
+    axis, action = choice.time_axis, choice.action
+    is_full = axis.width == 1
+    full = np.maximum(axis.discounts, LEAST_DISCOUNT) if is_full else np.ones(axis.num_components)
+    for kind, comes, unit in (
+        ("events", "comes", " times"),
+        ("amounts", "adds up to", "" if is_full else " (discounted)"),
+    ):
+        for outcome, last_step, rows in _told(choice, kind):
+            is_event, row, i = kind == "events", rows[0], int(rows[0].argmax())
+            sums = rows.sum(axis=1) if is_event else (rows / full[: len(row)]).sum(axis=1)
+            total, *others = sums.tolist()
+            words = {"outcome": outcome, "comes": comes, "unit": unit}
+            about = {"action": action, "last_step": last_step, "total": total} | words
+            peak = {"component": i, "chance": float(row[i]), "count": last_step + 1}
+            if is_event and (len(row) == 1 or total <= DOUBT):
+                yield "chance-of", about | {"chance": total}
+            elif is_event and row[i] >= _PEAK * np.delete(row, i).mean():
+                yield "likeliest", about | peak
+            else:
+                yield "counted", about
+            for other in others:
+                if abs(total - other) > max(DOUBT * is_event, SHARE * max(abs(total), abs(other))):
+                    yield "differs", about | {"foil": choice.foil, "other": other}
+
+
+@CHOICES.rule(
+    "{outcome:text} cannot be told yet: such forecasts have not proved better than a guess."
+)
+def untold(choice: Choice) -> Iterator[Fields]:
+    """What was asked for."""
+    known = choice.moment.outlook
+    yield from ({"outcome": name} for name in (() if known is None else known.untold))
+
+
+def _told(
+    choice: Choice, kind: str, *, together: bool = False
+) -> Iterator[tuple[str, int, FloatArray]]:
+    """Yields what can be told, up to which step, and `[1 or 2, K]` of the action and its foil."""
+    moment, known = choice.moment, choice.moment.outlook
+    at = [moment.index(name) for name in (choice.action, choice.foil) if name is not None]
+    for name, rows in {} if known is None else known.told(kind, together=together).items():
+        yield name, rows.shape[-1] * moment.time_axis.width - 1, rows[at]

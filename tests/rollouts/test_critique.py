@@ -86,7 +86,11 @@ def test_a_critic_that_is_right_is_told_to_be(seed):
 @pytest.mark.parametrize("by", [1.0, -1.0])
 def test_what_is_missing_everywhere_is_found(seed, by):
     found = report(values() + by, seed)
-    assert kinds(found) == ["value-off", "critic-sum", "critic-against"]
+    reached = ["critic-reached"] * (by < 0)
+    assert kinds(found) == ["value-off", "critic-sum", *reached, "critic-against"]
+    for claim in (of for of in critic.claims(found) if of.kind == "critic-reached"):
+        assert claim.sentence.startswith("On average, as much as its own critic says in all is")
+        assert 0 < claim.span[1] < AXIS.horizon
     assert kinds(found, critic.FORECASTS)[0] == "value-right"
     assert critique(found).repair[0] == pytest.approx(-by)
     (claim,) = critic.wrong(found)

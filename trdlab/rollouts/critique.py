@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from trdlab.arrays import FloatArray
+from trdlab.arrays import FloatArray, one_sign
 from trdlab.decomposition import TimeAxis
 from trdlab.rollouts.episodes import Episode
 from trdlab.rollouts.realised import common_axis, returns
@@ -62,6 +62,8 @@ class Critique:
         thirds: `[2, 3]`, of the steps where the critic says least, and most: what it says there,
             what came, and the difference.
         split: the component before which half of what is forecast comes.
+        reached: the component up to which as much is forecast on average as the critic says in all;
+            None if that is not before the residual, or some components pay and others cost.
         counts: `[3]`, how much the critic counts of what comes before that, and from there on;
             last, the difference. NaN where the two do not explain nearly all that it says.
         furthest: the steps at which the two are furthest apart.
@@ -83,6 +85,7 @@ class Critique:
     repair: FloatArray
     thirds: Estimates
     split: int
+    reached: int | None
     counts: Estimates
     furthest: tuple[dict[str, float], ...]
 
@@ -217,9 +220,16 @@ def _compared(steps: Sequence[_Steps], axis: TimeAxis, gamma: float | None, seed
         repair=repair,
         thirds=of(_thirds),
         split=split,
+        reached=_reached(told.mean(axis=0), float(said[:, 0].mean())),
         counts=of(_counts),
         furthest=tuple(dict(zip(_FURTHEST, row, strict=True)) for row in furthest.tolist()),
     )
+
+
+def _reached(told: FloatArray, value: float) -> int | None:
+    """Returns the explicit component at which a sum of one sign `[N+1]` reaches a value."""
+    there = np.flatnonzero(told[:-1].cumsum() * np.sign(value) >= abs(value))
+    return int(there[0]) if there.size and one_sign(told) and value else None
 
 
 def _means(sums: FloatArray) -> FloatArray:

@@ -176,6 +176,7 @@ def reports(draw: st.DrawFn) -> CalibrationReport:
             repair=np.array([draw(st.sampled_from([0.7, -2.5])), 0.053, 0.8]),
             thirds=Estimates(thirds, thirds, thirds),
             split=min(1, axis.horizon),
+            reached=draw(st.sampled_from([None, axis.horizon - 1])) if axis.horizon else None,
             counts=Estimates(counts, counts, counts),
             furthest=(),
         )

@@ -95,6 +95,9 @@ def causes(report: CalibrationReport) -> Found:
             "For each 1 that comes {near:span} its own critic counts {one:number}, for each 1 "
             "{far:span} {other:number}."
         ),
+        "critic-reached": (
+            "On average, as much as its own critic says in all is forecast {span:span} alone."
+        ),
         "critic-against": (
             "From what came, its own critic is typically {one:number} away, and the sum of its "
             "forecasts {other:number}."
@@ -114,6 +117,8 @@ def details(report: CalibrationReport) -> Found:
         near, far, _ = parts.value.tolist()
         spans = {"near": (0, told.split - 1), "far": (told.split, last)}
         yield "critic-when", spans | {"one": near, "other": far}
+    if told.is_same and told.is_off(0) and not told.is_wrong(1) and told.reached is not None:
+        yield "critic-reached", {"span": (0, told.reached)}
     if told.is_same and max(told.error.low[2], -told.error.high[2]) > 0.0:
         one, other, _ = told.error.value.tolist()
         yield "critic-against", {"one": sqrt(one), "other": sqrt(other)}

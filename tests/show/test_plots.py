@@ -5,7 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import matplotlib as mpl
@@ -163,6 +163,25 @@ def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
     off_by = [0.1, 0.1, 6.0]  # its whisker is beyond the scale, too
     unsure = replace(found, calibration=calibrated(found.time_axis, off_by=off_by))
     assert cut_texts(moment_figure(Choice(unsure, "go", "stay")).axes[0]) == ["94.50"]
+
+
+@pytest.mark.parametrize("residual", [3.0, 8.0, 10.0, 20.0])
+def test_bars_can_be_seen_beside_any_residual(residual):
+    ax = plot_components(Figure().subplots(), np.array([1.0, 1.0, 0.9, residual]), AXIS)
+    assert heights(ax)[0] / ax.get_ylim()[1] > 0.1
+    assert heights(ax)[-1] == residual or cut_texts(ax) == [f"{residual:.2f}"]
+
+
+@pytest.mark.parametrize("horizon", [1, 4, 25, 30, 40, 60, 100])
+@pytest.mark.parametrize("width", [1, 5])
+def test_labels_of_steps_stand_apart(horizon, width):
+    figure, axis = style.new_figure(3.0), TimeAxis(0.99, horizon, width)
+    ax = style.tidy(figure.subplots())
+    style.label_steps(ax, axis, style.positions(axis))
+    figure.draw_without_rendering()
+    boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
+    assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
+    assert ax.get_xticklabels()[-1].get_text() == axis.labels[-1]
 
 
 def test_a_residual_is_shown_whole_where_the_rest_is_next_to_nothing():

@@ -21,7 +21,7 @@ CUT = "cut"
 
 _MOST_LETTERS = 46  # of all numbers above one row of bars
 _MOST_CUTS = 4  # whiskers that are cut get a number each; of more only the furthest does
-_SWAMPS = 25.0  # times the largest explicit component, from which on a residual is cut off
+_SWAMPS = 8.0  # times the largest explicit component, from which on a residual is cut off
 _MATTERS = 0.01  # of the residual: explicit components that add up to less do not set the scale
 _ROOM = 1.5  # times the largest explicit component, that is shown then
 _REACH = 2.5  # times the bars, beyond which whiskers are cut off

@@ -188,10 +188,13 @@ def positions(axis: TimeAxis, gap: float = _GAP) -> FloatArray:
 
 def label_steps(ax: Axes, axis: TimeAxis, places: FloatArray) -> None:
     """Writes below some of the components what steps they cover, the residual among them."""
-    every = -(-sum(len(label) + 1 for label in axis.labels) // _MOST_LETTERS)
-    shown = [i for i in range(0, axis.horizon, every) if axis.horizon - i >= every / 2]
-    shown.append(axis.horizon)
-    ax.set_xticks(places[shown], [axis.labels[i] for i in shown])
+    labels, last = axis.labels, axis.horizon
+    every = -(-sum(len(label) + 1 for label in labels) // _MOST_LETTERS)
+    letter = (places[-1] - places[0] + 1.2) / _MOST_LETTERS  # how wide one is, in components
+    free = [places[-1] - letter * ((len(label) + len(labels[-1])) / 2 + 1) for label in labels]
+    shown = [i for i in range(0, last, every) if places[i] <= free[i]]
+    shown.append(last)
+    ax.set_xticks(places[shown], [labels[i] for i in shown])
     ax.set_xlim(places[0] - 0.6, places[-1] + 0.6)
 
 

@@ -114,6 +114,23 @@ class RewardDecomposition:
             )
         return RewardDecomposition(self.components - other.components, self.time_axis)
 
+    def under(self, probabilities: FloatArray) -> "RewardDecomposition":
+        """Returns what is expected before the action is chosen: `[..., N+1]`, v^TRD of a policy.
+
+        Of the components `[..., A, N+1]` that is Σ_a π(a|s)·q^TRD(s, a).
+
+        Args:
+            probabilities: π, `[..., A]`.
+
+        Source: Towers et al. (2024), appendix A.
+
+        >>> actions = RewardDecomposition([[1.0, 0.0], [0.0, 2.0]], TimeAxis(0.9, 1))
+        >>> print(actions.under(np.array([0.75, 0.25])).components)
+        [0.75 0.5 ]
+        """
+        mean = (probabilities[..., None, :] @ self.components)[..., 0, :]
+        return RewardDecomposition(mean, self.time_axis)
+
     def regroup(self, width: int) -> "RewardDecomposition":
         """Returns the same rewards in wider groups; the residual stays as it is.
 

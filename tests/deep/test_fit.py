@@ -40,6 +40,7 @@ def experience(rewards: list[float], until: list[int], *, ended: bool = True) ->
         frames=np.arange(count),
         probabilities=np.full((count, 2), 0.5),
         actions=np.zeros(count, dtype=np.int64),
+        forced=np.zeros(count, dtype=np.bool_),
         rewards=np.array([*rewards, 0.0]),
         outcomes=np.zeros((count, 0)),
         ends=ends,
@@ -150,6 +151,7 @@ def test_actions_are_forced_as_often_as_asked_for_and_cover_what_the_policy_neve
     of = played(steps=20_000)
     at_one = of.steps[of.frames[of.steps] == 1]
     back = (of.actions[at_one] == 0).mean()
+    assert of.forced[at_one][of.actions[at_one] == 0].all(), "the policy never goes back"
     assert 0.08 < back < 0.12, "a fifth is forced, half of that goes back"
     assert (of.last[of.steps] > of.steps).all()
     assert of.ends[of.last - 1].mean() > 0.99, "nearly all came to an end"

@@ -162,7 +162,7 @@ def test_a_saved_state_is_for_the_same_environments():
 def test_what_is_known_of_an_environment():
     cartpole = GymEnvironments("CartPole-v1", 2, seed=0)
     assert (cartpole.num_actions, cartpole.first_action) == (2, 0)
-    assert cartpole.action_names == ("action 0", "action 1")
+    assert cartpole.action_names == ("push left", "push right")
     assert (cartpole.time_limit, cartpole.frames_per_second, cartpole.frame_skip) == (500, 50, 1)
     short = GymEnvironments("CartPole-v1", seed=0, env_arguments={"max_episode_steps": 7})
     assert short.time_limit == 7

@@ -62,6 +62,9 @@ def test_ppo_of_games_and_of_numbers(tmp_path):
     likely, _ = ask(read(tmp_path / "a"), SCREENS)
     np.testing.assert_allclose(np.log(likely[:, 1:] / likely[:, :1]), logits[:, 1:] - logits[:, :1],
                                rtol=1e-3, atol=1e-4)  # fmt: skip
+    told = read(tmp_path / "a").state_values(SCREENS, None, np.ones(2, dtype=bool), likely)[0]
+    values = hidden(w).numpy() @ w["critic.weight"][0] + w["critic.bias"]
+    np.testing.assert_allclose(told, values, rtol=1e-4, atol=1e-5)
     w = save(tmp_path / "b", layers("critic.", 4, 3, 1) | layers("actor.", 4, 3, 2))
     first = np.tanh(SEEN @ w["actor.0.weight"].T + w["actor.0.bias"])
     logits = first @ w["actor.2.weight"].T + w["actor.2.bias"]
@@ -69,6 +72,10 @@ def test_ppo_of_games_and_of_numbers(tmp_path):
     policy = read(tmp_path / "b")
     np.testing.assert_allclose(ask(policy, SEEN)[0], odds / odds.sum(axis=1)[:, None], rtol=1e-4)
     assert policy.about.title == "PPO of CleanRL"
+    told = policy.state_values(SEEN, None, np.ones(6, dtype=bool), ask(policy, SEEN)[0])[0]
+    first = np.tanh(SEEN @ w["critic.0.weight"].T + w["critic.0.bias"])
+    values = first @ w["critic.2.weight"][0] + w["critic.2.bias"]
+    np.testing.assert_allclose(told, values, rtol=1e-4)
 
 
 @pytest.mark.parametrize("safe", [True, False])

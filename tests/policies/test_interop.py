@@ -16,6 +16,7 @@ sb3 = pytest.importorskip("stable_baselines3", reason="needs pip install 'trdlab
 contrib = pytest.importorskip("sb3_contrib", reason="needs pip install 'trdlab[interop]'")
 
 import torch  # noqa: E402
+from sb3_contrib.common.recurrent.type_aliases import RNNStates  # noqa: E402
 
 import trdlab  # noqa: E402
 from doors import Doors  # noqa: E402
@@ -23,7 +24,7 @@ from trdlab.agents import given  # noqa: E402
 from trdlab.environments.spaces import frame_space  # noqa: E402
 from trdlab.explanations import assessment  # noqa: E402
 from trdlab.explanations import explanation as explaining  # noqa: E402
-from trdlab.policies import ask  # noqa: E402
+from trdlab.policies import Likeliest, ask  # noqa: E402
 from trdlab.policies.files import Options  # noqa: E402
 from trdlab.policies.live import adapt as adapt_live  # noqa: E402
 from trdlab.policies.registry import read_policy  # noqa: E402
@@ -187,6 +188,50 @@ def theirs(model: Any, observations: np.ndarray, state: Any, begins: np.ndarray)
         return likelihoods(told), state
 
 
+def their_values(
+    model: Any, observations: Any, state: Any, begins: np.ndarray, likely: np.ndarray
+) -> tuple[np.ndarray, Any]:
+    """Returns what the library's critic says `[B]`; of values of actions, that of the policy's."""
+    policy = model.policy
+    if not hasattr(policy, "predict_values"):
+        return (theirs(model, observations, None, begins)[0] * likely).sum(axis=1), None
+    seen, _ = policy.obs_to_tensor(observations)
+    with torch.no_grad():
+        if not hasattr(policy, "lstm_actor"):
+            return policy.predict_values(seen)[:, 0].numpy(), None
+        lstm, starts = policy.lstm_actor, torch.tensor(begins).float()
+        blank = torch.zeros(lstm.num_layers, len(begins), lstm.hidden_size)
+        state = RNNStates((blank, blank), (blank, blank)) if state is None else state
+        values = policy.predict_values(seen, state.vf, starts)[:, 0].numpy()
+        return values, policy.forward(seen, state, starts)[3]
+
+
+@pytest.mark.parametrize("live", [False, True], ids=["archive", "loaded"])
+def test_every_critic_says_what_its_library_says(model, live, tmp_path):
+    _, made, space = model
+    with torch.no_grad():  # large weights let large numbers cancel in float32
+        for parameter in made.policy.parameters():
+            parameter.div_(3.0)
+    made.save(tmp_path / "agent")
+    policy = adapt_live(made) if live else read_policy(tmp_path / "agent.zip", Options())
+    observations = drawn(space, 1000)
+    starts = np.random.default_rng(5).random((50, 20)) < 0.05  # [T, B], of later episodes
+    mine, their, said = None, None, []
+    for step, begins in enumerate(starts):
+        begins |= step == 0
+        batch = observations[20 * step : 20 * step + 20]
+        shown = as_shown(space, batch)
+        likely = ask(policy, shown, None, begins)[0]
+        told, their = their_values(made, together(batch), their, begins, likely)
+        values, mine = policy.state_values(shown, mine, begins, likely)
+        np.testing.assert_allclose(values, told, rtol=2e-5, atol=2e-5 * np.abs(told).max())
+        said.append(values)
+    assert np.ptp(said) > 1e-3
+    greedy = Likeliest(policy)
+    np.testing.assert_array_equal(greedy.state_values(shown, mine, begins, likely)[0],
+                                  policy.state_values(shown, mine, begins, likely)[0])  # fmt: skip
+
+
 @pytest.mark.parametrize("live", [False, True], ids=["archive", "loaded"])
 def test_every_algorithm_acts_as_its_library_says(model, live, tmp_path):
     name, made, space = model
@@ -232,7 +277,14 @@ def test_what_the_environment_normalises_is_normalised(tmp_path):
     inside.save(tmp_path / "a.pkl")
     read = trdlab.agent(f"{tmp_path}/a.zip,normalize={tmp_path}/a.pkl", env="CartPole-v1")
     np.testing.assert_allclose(ask(read.policy, seen)[0], told, rtol=1e-5)
-    assert repr(agent) == "<Agent: PPO · not fitted · action 0, action 1>"
+    assert repr(agent) == "<Agent: PPO · not fitted · push left, push right>"
+    unit = np.sqrt(inside.ret_rms.var + inside.epsilon)
+    assert not 0.9 < unit < 1.1
+    with torch.no_grad():
+        values = model.policy.predict_values(tensor)[:, 0].numpy() * unit
+    for policy in (agent.policy, read.policy):
+        told, _ = policy.state_values(seen, None, np.ones(2, dtype=bool), likely)
+        np.testing.assert_allclose(told, values, rtol=1e-5)
 
 
 def test_what_is_normalised_of_several_parts_is_normalised(tmp_path):

@@ -10,10 +10,11 @@ import numpy as np
 
 from trdlab.agents.models import World
 from trdlab.agents.places import Origin, look
+from trdlab.decomposition import RewardDecomposition
 from trdlab.environments.batches import Make, in_batches
 from trdlab.environments.interface import Interface
 from trdlab.estimator import Estimator, Unfitted
-from trdlab.policies import Likeliest, Policy, acting
+from trdlab.policies import Likeliest, Policy, acting, ask
 from trdlab.rollouts.branches import Copying
 from trdlab.rollouts.episodes import Episode, Recording, collect
 from trdlab.rollouts.evaluation import Evaluation, score
@@ -120,6 +121,18 @@ class Agent:
         policy = acting(self.policy or self.estimator)
         who = Likeliest(policy) if greedy else policy
         return score(who, self.make, episodes, max_steps=max_steps, seed=seed, watch=watch)
+
+    def state_value(self, observations: Any) -> RewardDecomposition:
+        """Returns what it expects before it chooses: v^TRD, `[B, N+1]`, of its own policy.
+
+        Args:
+            observations: `[B, ...]`; of an agent that remembers, those that begin episodes.
+
+        Raises:
+            InputError: nobody knows yet what it expects.
+        """
+        told = self.estimator.decompose(observations)
+        return told.under(ask(acting(self.policy or self.estimator), observations)[0])
 
     def action(self, name: str) -> str:
         """Returns the name of an action that is given by its name or its number."""

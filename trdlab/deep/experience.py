@@ -35,6 +35,7 @@ class Experience:
         frames: `[M, ...]`, the newest of what was seen.
         probabilities: `[M, A]`, of each action under the policy.
         actions: `[M]`; of no moment in a last row, nor are the rewards.
+        forced: `[M]`, whether the action was forced.
         rewards: `[M]`, as the future counts them.
         outcomes: `[M, Q]`, what else is forecast, in numbers.
         ends: `[M]`, whether nothing is left to come after a step.
@@ -50,6 +51,7 @@ class Experience:
     frames: NDArray[Any]
     probabilities: FloatArray
     actions: IntArray
+    forced: BoolArray
     rewards: FloatArray
     outcomes: FloatArray
     ends: BoolArray
@@ -282,23 +284,23 @@ def _played(
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
         which = np.flatnonzero(running)
         read = outcomes.read(actions, step, which)  # [R, Q]
-        paid, was = future.count(step.rewards)[running], (ends[running], forced[running])
-        log.append((which, seen, turn.probabilities, actions[running], paid, read, *was))
+        paid, done = future.count(step.rewards)[running], (actions[running], forced[running])
+        log.append((which, seen, turn.probabilities, *done, paid, read, ends[running]))
         if playing.finished.any():
             over = np.flatnonzero(playing.finished)
             wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
             coin[over] = np.maximum(playing.steps, free[over]) + wait
-            none, nothing = np.zeros(len(over), dtype=np.bool_), np.zeros((len(over), 1))
-            done = (none.astype(np.int64), nothing[:, 0], nothing.repeat(read.shape[1], axis=1))
+            none, nothing = np.zeros(len(over), dtype=np.bool_), np.zeros(len(over))
+            ended = (none.astype(np.int64), none, nothing, np.zeros((len(over), read.shape[1])))
             whole, likely = playing.last_seen()
             newest = whole[:, -1] if playing.stack.size else whole
-            log.append((over, newest, likely, *done, none, none))
+            log.append((over, newest, likely, *ended, none))
     episode, *columns = (np.concatenate(column) for column in zip(*log, strict=True))
     order, lengths = np.argsort(episode, kind="stable"), np.bincount(episode)
-    *columns, were_forced = (column[order] for column in columns)
+    columns = [column[order] for column in columns]
     last = np.repeat(lengths.cumsum() - 1, lengths)  # [M]
     first = np.repeat(lengths.cumsum() - lengths, lengths)  # [M]
-    until = np.append(next_flag(were_forced, FAR)[1:], FAR)
+    until = np.append(next_flag(columns[_COLUMNS.index("forced")], FAR)[1:], FAR)
     until = np.where(until < last, until, first + np.repeat(coin, lengths))
     own = None if future.time_limit_ends else playing.environments.time_limit
     limits = [limit for limit in (own, playing.max_steps) if limit is not None]

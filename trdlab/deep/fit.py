@@ -26,7 +26,7 @@ from trdlab.estimator import Future
 from trdlab.rollouts.realised import Samples
 from trdlab.time_axis import TimeAxis
 
-_LEAST_SCALE = 1e-6  # of the largest: a component that hardly pays is not blown up to its size
+_RARE = 0.05  # of the most that came: so small the scale of what is rare can be
 _FALLS = 5  # times that the learning rate falls before learning stops
 _FALL = 0.3  # what is left of it each time
 _GAIN = 1e-3  # of the held-out error: it has to fall by so much to count as falling
@@ -248,7 +248,7 @@ class Fit:
             `[count, K]`, `[count, K, C, N+1]` as shares of the scale, and `[count, K, 1, N+1]`.
         """
         size, method = self.settings.batch_size, self.settings.method
-        rows = self.rng.choice(self._learned, count * size)
+        rows = self._some(self._learned, count * size)
         most = 1 if method == "td" else None
         ahead = self.experience.ahead(rows, self.axis, self._groups, most)
         target = ahead.target(self.axis, *self._expected(ahead)) / self.scale.astype(np.float32)
@@ -258,6 +258,18 @@ class Fit:
             counts = np.column_stack([ahead.known(self.axis), own >= ahead.came.shape[-1]])
         whole = (rows, target, counts[:, None].astype(np.float32))
         return tuple(part.reshape(count, size, *part.shape[1:]) for part in whole)  # type: ignore[return-value]
+
+    def _some(self, rows: IntArray, count: int) -> IntArray:
+        """Returns some of these steps, half of them with actions that were forced, if any were.
+
+        Else what is seldom done would be learned last, and learning stop before.
+        """
+        forced = rows[self.experience.forced[rows]]
+        if not forced.size:
+            return np.asarray(self.rng.choice(rows, count))
+        half = count // 2
+        some = np.append(self.rng.choice(forced, half), self.rng.choice(rows, count - half))
+        return np.asarray(self.rng.permutation(some))
 
     def _expected(self, ahead: Ahead) -> tuple[FloatArray, IntArray]:
         """Returns `[U, C, N+1]`, what is expected in rows that follow, and which one follows each.
@@ -289,7 +301,11 @@ class Fit:
         return of.steps[~is_kept], of.steps[is_kept]
 
     def _scale(self) -> FloatArray:
-        """Returns `[C, N+1]`: the root mean square of what came, and what the residual could be."""
+        """Returns `[C, N+1]`: the root mean square of what came, and what the residual could be.
+
+        It is no less than a part of the most that ever came: else the few steps before something
+        rare would teach so much at once that all else is forgotten.
+        """
         rows = self.rng.choice(self._learned, min(len(self._learned), 20_000), replace=False)
         ahead = self.experience.ahead(rows, self.axis, self._groups)
         known = ahead.known(self.axis)[:, None]  # [K, 1, N]
@@ -300,8 +316,9 @@ class Fit:
         length = np.mean(self.experience.last[rows] - rows)  # steps that were still to come
         groups = min(whole, max(length / self.axis.width, 1.0))
         scale = np.column_stack([size, self.axis.discounts[-1] * paid * groups])  # [C, N+1]
-        largest = scale.max(axis=1, keepdims=True)
-        return np.asarray(np.maximum(scale, np.maximum(_LEAST_SCALE * largest, 1e-30)))
+        most = np.abs(self._groups[self.experience.steps]).max(axis=0)  # [C]
+        least = np.maximum(_RARE * most[:, None] * self.axis.discounts, 1e-30)
+        return np.asarray(np.maximum(scale, least))
 
     def _syncs(self) -> int:
         """Returns how often the target network is copied until what is expected has settled."""
@@ -316,9 +333,7 @@ class Fit:
 
         What came is `[K, C, N+1]`, as shares of the scale, and known `[K, 1, N+1]`.
         """
-        rows = self._kept
-        if len(rows) > 20_000:
-            rows = self.rng.choice(rows, 20_000, replace=False)
+        rows = np.unique(self._some(self._kept, 20_000))
         ahead = self.experience.ahead(rows, self.axis, self._groups)
         nothing = np.zeros((1, *self.scale.shape)), np.zeros(len(rows), dtype=np.int64)
         came = ahead.target(self.axis, *nothing) / self.scale

@@ -110,18 +110,20 @@ PRESETS["gym"] |= {
             "agent_steps": 200_000,
             "num_envs": 8,
             "learning_starts": 2_000,
-            "epsilon_end": 0.1,  # with less, and without holding, it learns to hover for ever
+            "gamma": 0.98,  # to hover for another step must cost more than the network errs by
+            "epsilon_end": 0.1,
             "epsilon_steps": 30_000,
             "epsilon_hold": 4,
             "batch_size": 128,
             "learning_rate_end": 0.0,
+            "target_sync_updates": 125,
             "double": True,
             "loss": "huber",
             "max_grad_norm": 10.0,
             "hidden": [256, 256],
             "capacity": 200_000,
-            "checkpoint_every": 10_000,
-            "checkpoint_episodes": 50,
+            "checkpoint_every": 5_000,  # of two in a row, one may land and the other one hover
+            "checkpoint_episodes": 20,
         },
     ),
 }

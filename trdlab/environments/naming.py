@@ -7,6 +7,14 @@ from typing import Any
 
 import numpy as np
 
+_KNOWN = {
+    "CartPole": ("push left", "push right"),
+    "MountainCar": ("push left", "no push", "push right"),
+    "Acrobot": ("torque -1", "torque 0", "torque +1"),
+    "LunarLander": ("no engine", "left engine", "main engine", "right engine"),
+}
+"""What Gymnasium's documentation says of tasks that do not name their own actions."""
+
 
 def numbered(num_actions: int, first: int = 0) -> tuple[str, ...]:
     """Returns A names for actions that have none, with the numbers the environment gives them.
@@ -30,7 +38,8 @@ def is_numbered(names: Sequence[str]) -> bool:
 def action_names(env: Any, sizes: Sequence[int], first: int = 0) -> tuple[str, ...]:
     """Returns A names: what an environment calls its actions, or else their numbers.
 
-    It tells them in `action_names` or, as Atari games do, by `get_action_meanings()`. Names that
+    It tells them in `action_names` or, as Atari games do, by `get_action_meanings()`; of a few
+    tasks of Gymnasium that do not, they are known. Names that
     are too few, too many, or not all different count as none. Where actions have several parts it
     may also tell the names of each part's choices, a list for each: an action is called by all of
     them, such as "left+jump"; without names by their numbers.
@@ -41,7 +50,8 @@ def action_names(env: Any, sizes: Sequence[int], first: int = 0) -> tuple[str, .
         first: what the environment itself calls action 0.
     """
     base = getattr(env, "unwrapped", env)
-    names: Any = getattr(base, "action_names", ())
+    task = str(getattr(getattr(base, "spec", None), "id", "")).rpartition("-v")[0]
+    names: Any = getattr(base, "action_names", _KNOWN.get(task, ()))
     if hasattr(base, "get_action_meanings"):
         names = base.get_action_meanings()
     if len(sizes) > 1 and [np.size(part) for part in names] == list(sizes):

@@ -83,6 +83,7 @@ def assess(
         branches,
         foils,
         score=score,
+        gamma=getattr(agent.policy, "gamma", None),
         seconds_per_step=agent.seconds_per_step,
         seed=seed,
     )

@@ -34,7 +34,7 @@ _OF_PART: dict[Part, tuple[str, ...]] = {
     "forecast": ("forecast", "outcomes", "context"),
     "contrast": ("contrast", "flips", "differences", "trial", "context"),
     "episode": ("episode",),
-    "calibration": ("score", "trust", "faults", "later", "others", "judged"),
+    "calibration": ("score", "trust", "faults", "later", "others", "critic", "judged"),
 }
 
 

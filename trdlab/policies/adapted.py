@@ -123,6 +123,16 @@ class Valuing:
         """Returns the same, that sees observations changed."""
         return replace(self, values=lambda observations: self.values(change(observations)))
 
+    def paid(self, unit: float) -> Self:
+        """Returns the same, its values in the reward of the environment: so many times as large."""
+        return replace(self, values=lambda observations: self.values(observations) * unit)
+
+    def state_values(
+        self, observations: Any, state: Any, begins: BoolArray, likely: FloatArray
+    ) -> tuple[FloatArray, Any]:
+        """Returns the value of what is done `[B]` (see `StateValues`): the mean over actions."""
+        return (self.q_values(observations) * likely).sum(axis=1), None
+
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns 1 for that action `[B, A]`; there is nothing to remember."""
         return self.act_within(observations, state, begins, None)
@@ -153,6 +163,13 @@ class Valuing:
 Scores = Callable[[Any, Any, BoolArray], tuple[FloatArray, Any]]
 """From observations, what is remembered and where episodes begin to logits `[B, A]` and memory."""
 
+StateValues = Callable[[Any, Any, BoolArray, FloatArray], tuple[FloatArray, Any]]
+"""What a policy's own critic says: from observations, what the critic remembers, where episodes
+begin, and how likely each action is `[B, A]`, to what states are worth `[B]`, and its memory.
+
+A policy that has a critic offers this as `state_values`. It is asked at every step of an episode,
+in order, as the policy is, and has a memory of its own."""
+
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
@@ -161,10 +178,12 @@ class Drawing:
     Args:
         about: what is known about it.
         scores: the logits, and what to remember.
+        state_values: what its critic says; None where there is none.
     """
 
     about: About
     scores: Scores
+    state_values: StateValues | None = None
 
     @property
     def gamma(self) -> float | None:
@@ -173,13 +192,39 @@ class Drawing:
 
     def seeing(self, change: Callable[[Any], Any]) -> Self:
         """Returns the same, that sees observations changed."""
-        own = self.scores
-        return replace(self, scores=lambda seen, state, begins: own(change(seen), state, begins))
+        own, critic = self.scores, self.state_values
+        seeing = replace(self, scores=lambda seen, *asked: own(change(seen), *asked))
+        if critic is None:
+            return seeing
+        return replace(seeing, state_values=lambda seen, *asked: critic(change(seen), *asked))
+
+    def paid(self, unit: float) -> Self:
+        """Returns the same, its critic in the reward of the environment: so many times as large."""
+        if (critic := self.state_values) is None:
+            return self
+
+        def paid(*asked: Any) -> tuple[FloatArray, Any]:
+            values, state = critic(*asked)
+            return values * unit, state
+
+        return replace(self, state_values=paid)
 
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns the probabilities `[B, A]`, and what to remember."""
         logits, state = self.scores(observations, state, begins)
         return softmax(logits), state
+
+
+def critic_of(told: Scores) -> StateValues:
+    """Returns the critic that a network with one output `[B, 1]` is; it minds no actions."""
+
+    def state_values(
+        observations: Any, state: Any, begins: BoolArray, likely: FloatArray
+    ) -> tuple[FloatArray, Any]:
+        values, state = told(observations, state, begins)
+        return values[:, 0], state
+
+    return state_values
 
 
 def combined(parts: Sequence[FloatArray]) -> FloatArray:

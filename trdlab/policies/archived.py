@@ -1,7 +1,8 @@
-"""What an archive of Stable-Baselines3 says of its spaces: as text beside pickles left unread."""
+"""What an archive of Stable-Baselines3 says of itself: as text beside pickles left unread."""
 
 import re
 from ast import literal_eval
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 Shape = tuple[int, ...]
@@ -56,6 +57,30 @@ def parts(space: Any) -> dict[str, Shape]:
         return {}
     found = _PART.finditer(str(space.get("spaces", "")))
     return {str(literal_eval(part["key"])): _part(part["kind"], part["rest"]) for part in found}
+
+
+def algorithm(weights: Iterable[str], data: Mapping[str, Any], values: str) -> str:
+    """Returns the algorithm that an archive is of; it does not say so itself."""
+    home = module(data)
+    if values:
+        return "QR-DQN" if values == "quantile_net" else "DQN"
+    if any(name.startswith("lstm_actor.") for name in weights):
+        return "RecurrentPPO"
+    if "action_net.weight" in weights:
+        if "maskable" in home:
+            return "MaskablePPO"
+        if "clip_range" in data:
+            return "PPO"
+        return "TRPO" if "cg_max_steps" in data else "A2C"
+    found = re.search(r"\.(\w+)\.policies$", home)
+    return found[1].upper() if found else "an unknown algorithm"
+
+
+def module(data: Mapping[str, Any]) -> str:
+    """Returns the module of its policy's class, such as `stable_baselines3.dqn.policies`."""
+    kind = data.get("policy_class")
+    said = kind.get("__module__", "") if isinstance(kind, dict) else ""
+    return re.sub(r"[^\w.]", "?", str(said))
 
 
 def _part(kind: str, rest: str) -> Shape:

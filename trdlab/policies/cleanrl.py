@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from torch import nn
 
-from trdlab.policies.adapted import About, Drawing, Valuing
+from trdlab.policies.adapted import About, Drawing, Valuing, critic_of
 from trdlab.policies.files import AgentFile, Options
 from trdlab.policies.networks import (
     Network,
@@ -40,15 +40,21 @@ def adapt(file: AgentFile, options: Options) -> Drawing | Valuing | None:
         about = _about("DQN", network, len(weights["network.9.weight"]), "ReLU", draws=False)
         return Valuing(about, network)
     if layers == {*_CONVOLUTIONS, "network.7", "actor", "critic"}:
-        network = _of_games(weights, dense(weights, ["network.7", "actor"], nn.ReLU))
-        return Drawing(_about("PPO", network, len(weights["actor.weight"]), "ReLU"), plain(network))
+        network, critic = (
+            _of_games(weights, dense(weights, ["network.7", head], nn.ReLU))
+            for head in ("actor", "critic")
+        )
+        about = _about("PPO", network, len(weights["actor.weight"]), "ReLU")
+        return Drawing(about, plain(network), critic_of(plain(critic)))
     if _are(layers, r"(actor|critic)\.\d+") and "actor.0" in layers:
         names, between = numbered(weights, "actor."), activation(options.activation or "Tanh")
         actor = dense(weights, names, between)
         size, count = flow(actor)
         network = Network(actor, (size,))
         about = _about("PPO", network, count, between.__name__)
-        return Drawing(about, plain(network))
+        critic = Network(dense(weights, numbered(weights, "critic."), between), (size,))
+        has_critic = "critic.0" in layers
+        return Drawing(about, plain(network), critic_of(plain(critic)) if has_critic else None)
     return None
 
 

@@ -1,6 +1,7 @@
 """Agents of Stable-Baselines3 and sb3-contrib that are loaded already, asked as they are."""
 
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium as gym
@@ -12,7 +13,7 @@ from trdlab.environments.actions import Actions
 from trdlab.environments.flat import FlatSpace
 from trdlab.environments.spaces import frame_space
 from trdlab.errors import InputError
-from trdlab.policies.adapted import NEAREST, About, Drawing, Valuing, combined
+from trdlab.policies.adapted import NEAREST, About, Drawing, Valuing, combined, critic_of
 from trdlab.policies.networks import sizes
 
 
@@ -60,8 +61,11 @@ def adapt(model: Any) -> Drawing | Valuing | None:
     )
     asked = _Asked(model, seen)
     if values is None:
-        return Drawing(about, asked.remembering if memory else asked.logits)
-    return Valuing(about, asked.quantiles if values == "quantile_net" else asked.values)
+        scores = asked.remembering if memory else asked.logits
+        critic = asked.critic_remembering if memory else asked.critic
+        return Drawing(about, scores, critic_of(critic)).paid(asked.unit)
+    told = Valuing(about, asked.quantiles if values == "quantile_net" else asked.values)
+    return told.paid(asked.unit)
 
 
 def _layers(policy: Any, values: str | None) -> str:
@@ -92,6 +96,14 @@ class _Asked:
         self._normalise = finder()
         self._policy.set_training_mode(False)
 
+    @property
+    def unit(self) -> float:
+        """What `VecNormalize` divides rewards by; 1 where it leaves them alone."""
+        by = self._normalise
+        if by is None or not getattr(by, "norm_reward", False):
+            return 1.0
+        return float(np.sqrt(by.ret_rms.var + by.epsilon))
+
     def values(self, observations: Any) -> FloatArray:
         """Returns the value of each action `[B, A]`."""
         with torch.no_grad():
@@ -112,17 +124,40 @@ class _Asked:
         self, observations: Any, state: Any, begins: BoolArray
     ) -> tuple[FloatArray, Any]:
         """Returns the logits of each action `[B, A]`, and a pair `[B, layers, hidden]`."""
-        policy, lstm = self._policy, self._policy.lstm_actor
-        blank = np.zeros((len(begins), lstm.num_layers, lstm.hidden_size), dtype=np.float32)
-        held = (blank, blank) if state is None else state
-        now = tuple(
-            torch.as_tensor(part, device=policy.device).transpose(0, 1).contiguous()
-            for part in held
-        )
-        starts = torch.as_tensor(begins, dtype=torch.float32, device=policy.device)
+        now, starts = self._held(state, begins)
         with torch.no_grad():
-            told, then = policy.get_distribution(self._seen(observations), now, starts)
-        return _logits(told), tuple(_array(part.transpose(0, 1)) for part in then)
+            told, then = self._policy.get_distribution(self._seen(observations), now, starts)
+        return _logits(told), _pair(then)
+
+    def critic(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
+        """Returns the values of states `[B, 1]`, and nothing to remember."""
+        with torch.no_grad():
+            return _array(self._policy.predict_values(self._seen(observations))), None
+
+    def critic_remembering(
+        self, observations: Any, state: Any, begins: BoolArray
+    ) -> tuple[FloatArray, Any]:
+        """Returns the values of states `[B, 1]`, and a pair `[B, layers, hidden]`.
+
+        The library's `predict_values` does not tell what is to be remembered, and its `forward`
+        does.
+        """
+        now, starts = self._held(state, begins)
+        both = SimpleNamespace(pi=now, vf=now)
+        with torch.no_grad():
+            told = self._policy.forward(self._seen(observations), both, starts, deterministic=True)
+        _, values, _, then = told
+        return _array(values), _pair(then.vf)
+
+    def _held(self, state: Any, begins: BoolArray) -> tuple[Any, torch.Tensor]:
+        """Returns what an LSTM remembers, and where episodes begin, as the policy takes them."""
+        device, lstm = self._policy.device, self._policy.lstm_actor
+        blank = np.zeros((len(begins), lstm.num_layers, lstm.hidden_size), dtype=np.float32)
+        now = tuple(
+            torch.as_tensor(part, device=device).transpose(0, 1).contiguous()
+            for part in ((blank, blank) if state is None else state)
+        )
+        return now, torch.as_tensor(begins, dtype=torch.float32, device=device)
 
     def _seen(self, observations: Any) -> Any:
         """Returns observations as the policy takes them."""
@@ -137,6 +172,11 @@ def _logits(told: Any) -> FloatArray:
     """Returns the logits of a distribution `[B, A]`; those of several parts are in a list."""
     of = getattr(told, "distributions", None) or told.distribution
     return combined([_array(part.logits) for part in (of if isinstance(of, list) else [of])])
+
+
+def _pair(held: Any) -> tuple[FloatArray, ...]:
+    """Returns what an LSTM remembers, `[B, layers, hidden]` each."""
+    return tuple(_array(part.transpose(0, 1)) for part in held)
 
 
 def _array(tensor: torch.Tensor) -> FloatArray:

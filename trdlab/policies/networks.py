@@ -67,7 +67,7 @@ def dense(
     """
     matrices = [_weight(weights, name) for name in names]
     for name, matrix in zip(names, matrices, strict=True):
-        if matrix.ndim != 2:
+        if matrix.ndim != 2 or not matrix.size:
             raise InputError(
                 f"The layer '{name}' has weights of shape {matrix.shape}.",
                 "Only linear layers can be read, [outputs, inputs].",

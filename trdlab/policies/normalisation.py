@@ -89,6 +89,29 @@ def read_normalisation(
     )
 
 
+def reward_unit(path: Path) -> float:
+    """Returns what rewards were divided by when a file was saved; 1 where they were left alone.
+
+    In training it changed as it was learned; by its end it hardly did.
+
+    Args:
+        path: a file that `VecNormalize.save` wrote.
+
+    Raises:
+        InputError: it is no such file, holds code, or no statistics of rewards.
+    """
+    held = vars(_read(path))
+    if not held.get("norm_reward", False):
+        return 1.0
+    try:
+        unit = float(np.sqrt(_floats(vars(held["ret_rms"])["var"]) + float(held["epsilon"])))
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"'{path}' holds no statistics of rewards.", "Name what VecNormalize.save wrote."
+        ) from error
+    return unit
+
+
 def _normalisation(
     path: Path, held: Mapping[str, Any], statistics: Any, seen: Shape | None
 ) -> Normalisation:

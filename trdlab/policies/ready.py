@@ -121,6 +121,11 @@ class Likeliest:
         """γ that the other one was trained with, if that is said."""
         return getattr(self.policy, "gamma", None)
 
+    @property
+    def state_values(self) -> Any:
+        """What the other one's critic says (`StateValues`), if it has one: of the other one."""
+        return getattr(self.policy, "state_values", None)
+
     def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
         """Returns 1 for that action `[B, A]`, and what the other policy remembers."""
         return self.act_within(observations, state, begins, None)

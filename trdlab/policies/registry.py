@@ -10,7 +10,7 @@ import numpy as np
 from trdlab.errors import InputError
 from trdlab.policies.adapted import Drawing, Valuing
 from trdlab.policies.files import Options, open_agent
-from trdlab.policies.normalisation import read_normalisation
+from trdlab.policies.normalisation import read_normalisation, reward_unit
 from trdlab.policies.protocol import Policy
 from trdlab.policies.ready import Likeliest
 
@@ -65,7 +65,10 @@ def _acting(found: Drawing | Valuing, options: Options, path: Path) -> Policy:
     try:
         if prod(seen) > _LARGEST:
             raise RuntimeError(f"it sees {prod(seen):,} numbers")  # noqa: TRY301
-        found.act(np.zeros((1, *seen), dtype=np.float32), None, np.ones(1, dtype=np.bool_))
+        blank = np.zeros((1, *seen), dtype=np.float32), None, np.ones(1, dtype=np.bool_)
+        likely, _ = found.act(*blank)
+        if found.state_values is not None:
+            found.state_values(*blank, likely)
     except RuntimeError as error:  # how PyTorch says that layers do not follow each other
         reason = str(error).splitlines()[0]
         raise InputError(
@@ -80,4 +83,5 @@ def _acting(found: Drawing | Valuing, options: Options, path: Path) -> Policy:
     if options.normalize is not None:
         change = read_normalisation(Path(options.normalize), found.about.seen, found.about.parts)
         found = found if change is None else found.seeing(change)
+        found = found.paid(reward_unit(Path(options.normalize)))
     return Likeliest(found) if options.greedy and isinstance(found, Drawing) else found

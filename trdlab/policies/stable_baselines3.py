@@ -7,7 +7,7 @@ MaskablePPO are the environment's, and are no part of the archive.
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
@@ -18,7 +18,16 @@ from trdlab.arrays import BoolArray, FloatArray
 from trdlab.environments.actions import MOST
 from trdlab.errors import InputError
 from trdlab.policies import archived
-from trdlab.policies.adapted import NEAREST, About, Drawing, Scores, Valuing, combined
+from trdlab.policies.adapted import (
+    NEAREST,
+    About,
+    Drawing,
+    Scores,
+    StateValues,
+    Valuing,
+    combined,
+    critic_of,
+)
 from trdlab.policies.files import AgentFile, Options
 from trdlab.policies.networks import (
     Combined,
@@ -100,7 +109,7 @@ class _Saved:
         )
         said = data.get("policy_kwargs")
         kwargs = said if isinstance(said, dict) else {}
-        saved = cls(_algorithm(weights, data, values), weights, values, file, data, kwargs)
+        saved = cls(archived.algorithm(weights, data, values), weights, values, file, data, kwargs)
         saved.check()
         return saved
 
@@ -108,7 +117,7 @@ class _Saved:
         """Refuses a network that is not the library's own."""
         path, known = self.file.path, _VALUES if self.values else _ACTOR
         made = str(self.kwargs.get("features_extractor_class", ""))
-        homes = {"policy": _module(self.data), "extractor": made.removeprefix("<class '")}
+        homes = {"policy": archived.module(self.data), "extractor": made.removeprefix("<class '")}
         for part, home in homes.items():
             if home and home.partition(".")[0] not in ("stable_baselines3", "sb3_contrib"):
                 raise InputError(
@@ -231,17 +240,17 @@ def _drawing(saved: _Saved, options: Options) -> Drawing:
     """Returns the agent of an algorithm with an actor."""
     between, weights = saved.activation(options), saved.weights
     before, seen, divisor = saved.features("features_extractor.")
-    hidden = dense(weights, numbered(weights, "mlp_extractor.policy_net."), between, ends=True)
-    last = dense(weights, ["action_net"], between)
-    after = nn.Sequential(*hidden, *last)
-    _, outputs = flow(last)
+    after = _after(weights, "policy_net", "action_net", between)
+    _, outputs = flow(after)
     _check_actions(saved, outputs)
     count = prod(saved.choices) if saved.choices else outputs
-    told: dict[str, Any] = {"activation": _named(between, hidden)}
+    told: dict[str, Any] = {"activation": _named(between, after)}
     if saved.algorithm != "RecurrentPPO":
         network = Network(nn.Sequential(*before, after), _seen(saved, seen, before, after), divisor)
         about = saved.about(network.seen, count, layers=sizes(network.layers), **told)
-        return Drawing(about, _combining(saved, plain(network)))
+        return Drawing(
+            about, _combining(saved, plain(network)), _critic(saved, between, network.seen)
+        )
     memory = lstm(weights, "lstm_actor.")
     network = Network(nn.Sequential(*before), _seen(saved, seen, before, memory), divisor)
     about = saved.about(
@@ -251,7 +260,31 @@ def _drawing(saved: _Saved, options: Options) -> Drawing:
         memory=2 * memory.num_layers * memory.hidden_size,
         **told,
     )
-    return Drawing(about, _combining(saved, Recurrent(network, memory, after)))
+    scores = _combining(saved, Recurrent(network, memory, after))
+    return Drawing(about, scores, _critic(saved, between, network.seen))
+
+
+def _critic(saved: _Saved, between: type[nn.Module], seen: tuple[int, ...]) -> StateValues | None:
+    """Returns its critic, which has layers of its own, if it is kept in the archive."""
+    whole = replace(saved, weights=saved.file.weights)
+    parts = {name.partition(".")[0] for name in whole.weights}
+    if "value_net" not in parts:
+        return None
+    own = "vf_features_extractor" if "vf_features_extractor" in parts else "features_extractor"
+    before, _, divisor = whole.features(f"{own}.")
+    after = _after(whole.weights, "value_net", "value_net", between)
+    if saved.algorithm != "RecurrentPPO" or "critic" in parts:
+        first = dense(whole.weights, ["critic"] * ("critic" in parts), between)
+        return critic_of(plain(Network(nn.Sequential(*before, *first, after), seen, divisor)))
+    memory = lstm(whole.weights, "lstm_critic." if "lstm_critic" in parts else "lstm_actor.")
+    return critic_of(Recurrent(Network(nn.Sequential(*before), seen, divisor), memory, after))
+
+
+def _after(weights: Weights, hidden: str, last: str, between: type[nn.Module]) -> nn.Sequential:
+    """Returns the layers of an actor, or of a critic, after what both may share."""
+    names = numbered(weights, f"mlp_extractor.{hidden}.")
+    layers = dense(weights, names, between, ends=True)
+    return nn.Sequential(*layers, *dense(weights, [last], between))
 
 
 def _combining(saved: _Saved, scores: Scores) -> Scores:
@@ -304,26 +337,3 @@ def _check_actions(saved: _Saved, count: int) -> None:
             f"The network in '{saved.file.path}' has {count} outputs for {said} choices.",
             "Save the model again: model.save(…).",
         )
-
-
-def _algorithm(weights: Weights, data: Mapping[str, Any], values: str) -> str:
-    """Returns the algorithm that an archive is of; it does not say so itself."""
-    module = _module(data)
-    if values:
-        return "QR-DQN" if values == "quantile_net" else "DQN"
-    if any(name.startswith("lstm_actor.") for name in weights):
-        return "RecurrentPPO"
-    if "action_net.weight" in weights:
-        if "maskable" in module:
-            return "MaskablePPO"
-        if "clip_range" in data:
-            return "PPO"
-        return "TRPO" if "cg_max_steps" in data else "A2C"
-    found = re.search(r"\.(\w+)\.policies$", module)
-    return found[1].upper() if found else "an unknown algorithm"
-
-
-def _module(data: Mapping[str, Any]) -> str:
-    kind = data.get("policy_class")
-    said = kind.get("__module__", "") if isinstance(kind, dict) else ""
-    return re.sub(r"[^\w.]", "?", str(said))

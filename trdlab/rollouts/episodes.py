@@ -11,7 +11,8 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.environments import Environments
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
-from trdlab.policies import Policy
+from trdlab.policies import Policy, rows
+from trdlab.policies.adapted import StateValues
 from trdlab.rollouts.playing import Playing, Watch, unwatched
 
 
@@ -33,6 +34,8 @@ class Episode:
         epsilon: the chance of a random action.
         time_limit: the steps after which every such episode is truncated, if that is known.
         states: `[T+1]`, what was observed where that is one number: the state of a finite model.
+        critic: `[T]`, what the policy's own critic says that each state is worth; None where it has
+            none.
     """
 
     decomposition: RewardDecomposition
@@ -46,6 +49,7 @@ class Episode:
     epsilon: float = 0.0
     time_limit: int | None = None
     states: IntArray | None = None
+    critic: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -108,6 +112,8 @@ class Recording:
         first = self.playing.stack.observations  # [B, ...]
         self._states = [[state] for state in first] if first.ndim == 1 else []
         self._last = np.zeros((count, estimator.time_axis.num_components))
+        self._critic: StateValues | None = getattr(policy, "state_values", None)
+        self._memory, self._asked = None, np.arange(count)  # of the critic, and whose it is
 
     def play(
         self, until: int | None = None, *, watch: Watch = unwatched, what: str = "episodes"
@@ -142,10 +148,11 @@ class Recording:
     def _take(self) -> None:
         playing, future = self.playing, self._estimator.future
         running, decision, turn = playing.running, playing.decide(), playing.turn()
+        values = self._criticise(decision.probabilities)
         step = playing.take(turn.actions)
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
         told = (step.life_lost, ends, step.terminated, turn.random)
-        happened = (turn.actions, future.count(step.rewards), *told)
+        happened = (turn.actions, future.count(step.rewards), *told, values)
         seen = zip(decision.decomposition.components, decision.expected, strict=True)
         for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
             self._logs[env].append((*expectations, *(part[env] for part in happened)))
@@ -153,6 +160,17 @@ class Recording:
                 self._states[env].append(step.frames[env])
         if playing.finished.any():
             self._last[playing.finished] = playing.at_last().expected
+
+    def _criticise(self, likely: FloatArray) -> FloatArray:
+        """Returns what the critic says of the episodes that go on `[B]`; of no critic, NaN."""
+        playing, values = self.playing, np.full(len(self._logs), np.nan)
+        if self._critic is not None:
+            memory = rows(self._memory, playing.running[self._asked])
+            self._asked = np.flatnonzero(playing.running)
+            seen, begins = playing.stack.observations[playing.running], playing.steps == 0
+            asked = seen, memory, np.full(len(self._asked), begins), likely
+            values[self._asked], self._memory = self._critic(*asked)
+        return values
 
     def episodes(self) -> tuple[Episode, ...]:
         """Returns the E episodes, once all of them are over, in the order of the environments."""
@@ -167,7 +185,9 @@ class Recording:
     def _episode(self, env: int, coins: BoolArray, time_limit: int | None) -> Episode:
         """Returns the episode of an environment, of its log and of coins for past its end."""
         columns = [np.array(column) for column in zip(*self._logs[env], strict=True)]
-        components, expected, actions, rewards, life_lost, ends, terminated, random = columns
+        components, expected, actions, rewards, life_lost, ends, terminated, random, critic = (
+            columns
+        )
         return Episode(
             decomposition=RewardDecomposition(components, self._estimator.time_axis),
             expected=np.concatenate([expected, self._last[env][None]]).astype(np.float64),
@@ -180,6 +200,7 @@ class Recording:
             epsilon=self._epsilon,
             time_limit=time_limit,
             states=np.array(self._states[env]) if self._states else None,
+            critic=None if self._critic is None else critic,
         )
 
 

@@ -70,9 +70,8 @@ class Decision:
 
     @property
     def expected(self) -> FloatArray:
-        """`[B, N+1]`: the mean over the policy's actions."""
-        weights = self.probabilities[:, None]  # [B, 1, A]
-        return np.asarray((weights @ self.decomposition.components)[:, 0])
+        """`[B, N+1]`: the mean over the policy's actions, v^TRD."""
+        return self.decomposition.under(self.probabilities).components
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,7 +60,7 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
     padded = np.append(episode.rewards, np.zeros(axis.num_steps))
     windows = np.lib.stride_tricks.sliding_window_view(padded, axis.num_steps)[:total]
     alive = starts[:, None] + np.arange(axis.num_steps) <= end[:, None]  # [T, N·w]
-    later = np.append(_returns(episode, axis.gamma), np.zeros(axis.num_steps))[axis.num_steps :]
+    later = np.append(returns(episode, axis.gamma), np.zeros(axis.num_steps))[axis.num_steps :]
     residual = np.where(starts + axis.num_steps <= end, later * axis.gamma**axis.num_steps, 0.0)
     until = next_flag(np.append(episode.random, False), far)[1 : total + 1]  # [T]
     until = np.where(end < far, until, np.minimum(until, total))
@@ -132,10 +132,18 @@ def next_flag(flags: BoolArray, nowhere: int) -> IntArray:
     return np.asarray(np.minimum.accumulate(places[::-1])[::-1])
 
 
-def _returns(episode: Episode, gamma: float) -> FloatArray:
-    """Returns `[T]`: the discounted reward from each step on, up to the next end."""
-    returns, ahead = np.zeros(len(episode)), 0.0
+def returns(
+    episode: Episode, gamma: float | FloatArray, beyond: float | FloatArray = 0.0
+) -> FloatArray:
+    """Returns `[T, ...]`: the discounted reward from each step on, up to the next end.
+
+    Args:
+        episode: of T steps.
+        gamma: `[...]`, one discount factor or several.
+        beyond: what counts for all that would have come, where an episode was cut off.
+    """
+    found, ahead = np.zeros((len(episode), *np.shape(gamma))), beyond
     for step in reversed(range(len(episode))):
         ahead = episode.rewards[step] + (0.0 if episode.ends[step] else gamma * ahead)
-        returns[step] = ahead
-    return returns
+        found[step] = ahead
+    return found

@@ -26,6 +26,7 @@ from trdlab.explanations.rules import Claim, UnsupportedSentenceError, check
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
 from trdlab.rollouts.branches import Branching
+from trdlab.rollouts.critique import Critique
 from trdlab.rollouts.episodes import collect
 from trdlab.show.plots.calibration import plot_trust
 from trdlab.statistics import Estimate, Estimates
@@ -49,6 +50,13 @@ WORDS = {
     "goes on": "ends",
     "too few": "enough",
     "start": "end",
+    "least": "most",
+    "says most": "says least",
+    "more in every": "less in every",
+    "less in every": "more in every",
+    "its own critic": "the sum of its forecasts",
+    "Its own critic": "The sum of its forecasts",
+    "critic is right": "critic is wrong",
     "None": "All",
     "this one nothing": "this one all",
     "the agent's forecasts": "forecasts for actions it would not choose",
@@ -140,6 +148,39 @@ def reports(draw: st.DrawFn) -> CalibrationReport:
             time_limit=limit,
         )
 
+    def critique() -> Critique:
+        gamma = draw(st.sampled_from([0.9, 0.9, 0.98]))
+        judged = draw(st.sampled_from([1.0, 1.0, np.nan]))
+        said = np.array([draw(middle), draw(middle)])
+        near, far = draw(st.sampled_from([1.0, 0.63])), draw(st.sampled_from([1.0, 0.42]))
+        flat = st.sampled_from([1.0, 1.0, 1.7])
+        thirds = np.array([[draw(middle), draw(middle), 0.0] for _ in range(2)])
+        thirds[:, 2] = thirds[:, 0] - thirds[:, 1]
+        errors = np.array([draw(positive), draw(positive), 0.0])
+        errors[2] = errors[0] - errors[1]
+        counts = np.array([near, far, near - far])
+        return Critique(
+            time_axis=axis,
+            gamma=gamma,
+            factor=draw(st.sampled_from([1.0, 1.0, 0.053])),
+            said=said,
+            spread=np.ones(2),
+            came=judged * (said - [draw(st.sampled_from([0.0, 0.7])), 0.0]),
+            size=np.ones(2),
+            bias=estimates([True] * 2, st.sampled_from([0.0, 0.0, 0.7, -0.7])),
+            slope=estimates([True] * 2, flat),
+            error=Estimates(errors, errors, errors),
+            gap=Estimates(said, said, said),
+            correlation=0.9,
+            left=np.array(draw(st.permutations([0.0, 0.3, draw(st.sampled_from([0.0, 0.6]))]))),
+            repair=np.array([draw(st.sampled_from([0.7, -2.5])), 0.053, 0.8]),
+            thirds=Estimates(thirds, thirds, thirds),
+            split=min(1, axis.horizon),
+            reached=draw(st.sampled_from([None, axis.horizon - 1])) if axis.horizon else None,
+            counts=Estimates(counts, counts, counts),
+            furthest=(),
+        )
+
     discount = draw(st.sampled_from([0.9**axis.width, 0.99]))
     nothing = np.full(axis.horizon, np.nan)
     consistency = Consistency(
@@ -173,6 +214,7 @@ def reports(draw: st.DrawFn) -> CalibrationReport:
         foils=draw(st.sampled_from([None, calibration()])),
         scale=116.0,
         chance=draw(st.booleans()),
+        critique=draw(st.sampled_from([None, critique()])),
     )
 
 
@@ -215,7 +257,7 @@ def test_every_sentence_about_any_report_is_supported_and_no_mutation_is(report)
     assert survivors(report) == []
     for claim in everything(report):
         assert len(claim.sentence.replace(" %", "").split()) <= 25, claim.sentence
-    assert 2 <= len(in_brief(report)) <= 3 or report.time_axis.horizon == 0
+    assert 2 <= len(in_brief(report)) <= 4 or report.time_axis.horizon == 0
 
 
 def test_every_kind_of_claim_occurs():

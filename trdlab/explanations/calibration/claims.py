@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
 
-from trdlab.explanations.calibration import faults
+from trdlab.explanations.calibration import critic, faults
 from trdlab.explanations.calibration.calibration import Calibration, Status, Trust
 from trdlab.explanations.calibration.faults import REPORTS
 from trdlab.explanations.calibration.report import CalibrationReport
@@ -264,16 +264,17 @@ def sections(report: CalibrationReport) -> tuple[Section, ...]:
         ("faults", "What is wrong"): [*faults.faults(report), *wrong],
         ("later", "What comes later than it tells"): late,
         ("others", "Other actions"): _in_short(verdicts(report, OTHERS)),
+        ("critic", "Its own critic"): critic.claims(report),
         ("judged", "What this rests on"): every(report, *basis),
     }
     return tuple(Section(*title, tuple(claims)) for title, claims in found.items() if claims)
 
 
 def in_brief(report: CalibrationReport) -> list[Claim]:
-    """Returns how the agent does, how far to trust it, and the worst that is wrong."""
+    """Returns how the agent does, how far to trust it, the worst that is wrong, and its critic."""
     told = {section.name: section.claims for section in sections(report)}
-    trust = told["trust"]
-    return [*told["score"][:1], *trust[:1], *(told.get("faults") or trust[1:])[:1]]
+    trust, worst = told["trust"], told.get("faults") or told["trust"][1:]
+    return [*told["score"][:1], *trust[:1], *worst[:1], *critic.wrong(report)]
 
 
 def _trust(report: CalibrationReport) -> list[Claim]:

@@ -16,6 +16,7 @@ from trdlab.explanations.calibration.errors import Errors, errors_of
 from trdlab.explanations.calibration.residual import Residual, residual_of
 from trdlab.printable import Printable
 from trdlab.rollouts.branches import Branches
+from trdlab.rollouts.critique import Critique, critique_of
 from trdlab.rollouts.episodes import Episode, distinct
 from trdlab.rollouts.realised import pool
 from trdlab.statistics import FEWEST_EPISODES, Estimate, bootstrap
@@ -99,6 +100,7 @@ class CalibrationReport(Printable):
             copies share their chance.
         seconds_per_step: how long a step takes as people play, if that is known.
         lost: why there is no ceiling and there are no foils though they were asked for, else empty.
+        critique: how the policy's own critic compares; None where it has none.
     """
 
     future: Future
@@ -114,6 +116,7 @@ class CalibrationReport(Printable):
     chance: bool
     seconds_per_step: float | None = None
     lost: str = ""
+    critique: Critique | None = None
 
     @property
     def trust(self) -> Trust:
@@ -141,6 +144,7 @@ def judge(
     foils: Branches | None = None,
     *,
     score: Score | None = None,
+    gamma: float | None = None,
     seconds_per_step: float | None = None,
     seed: int = 0,
 ) -> CalibrationReport:
@@ -152,6 +156,7 @@ def judge(
         branches: what else could have followed, for the ceiling.
         foils: what followed other first actions than the policy's.
         score: how the agent does, left to itself; by default as in these episodes.
+        gamma: the discount factor that the policy's own critic was trained with, if that is known.
         seconds_per_step: how long a step takes as people play, if that is known.
         seed: of every bootstrap.
 
@@ -181,6 +186,7 @@ def judge(
         scale=max(float(np.abs(of.decomposition.components).max()) for of in episodes),
         chance=_has_chance(episodes) or any(of.shared_chance for of in copies),
         seconds_per_step=seconds_per_step,
+        critique=critique_of(episodes, gamma, seed=seed),
     )
 
 

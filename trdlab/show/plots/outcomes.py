@@ -1,6 +1,5 @@
 """What else is expected of an action and its foil: what happens, and what the reward is made of."""
 
-from collections.abc import Sequence
 from itertools import cycle
 
 import numpy as np
@@ -54,8 +53,10 @@ def plot_outcome(ax: Axes, choice: Choice, known: Outlook, name: str) -> Axes:
     rows[:, : of.shape[1]] = of[[choice.moment.index(action) for action in names]]
     colours, scale = style.action_colours(choice.moment.action_names), scale_of(rows)
     bars.dress(ax, axis, scale)
+    width = 0.8 / len(names)
     for i, action in enumerate(names):
-        _stack(ax, rows[i][None], axis, [colours[action]], scale, (i, len(names)))
+        how = {"offset": (i - 0.5 * (len(names) - 1)) * width, "width": width}
+        _stack(ax, axis, rows[i][None], [colours[action]], scale, **how)
     if name in known.events:
         ax.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
     title = name if name in known.events else f"{name}, discounted"
@@ -72,7 +73,7 @@ def plot_parts(ax: Axes, choice: Choice, known: Outlook, action: str) -> Axes:
     ends = [side.sum(axis=1)[at] for side in (rows.clip(min=0.0), rows.clip(max=0.0))]
     scale, own = scale_of(np.concatenate(ends)), rows[choice.moment.index(action)]
     bars.dress(ax, axis, scale)
-    _stack(ax, own, axis, [*part_colours(known).values()], scale)
+    _stack(ax, axis, own, [*part_colours(known).values()], scale)
     total = own.sum(axis=0)
     seen = np.where(scale.holds(total), total, np.nan)
     ax.plot(style.positions(axis), seen, "_", color=style.INK, markersize=9, zorder=3)
@@ -87,26 +88,18 @@ def part_colours(known: Outlook) -> dict[str, str]:
 
 
 def _stack(
-    ax: Axes,
-    rows: FloatArray,
-    axis: TimeAxis,
-    colours: Sequence[str],
-    scale: Scale,
-    place: tuple[int, int] = (0, 1),
+    ax: Axes, axis: TimeAxis, rows: FloatArray, colours: list[str], scale: Scale, **how: float
 ) -> None:
-    """Draws rows `[P, N+1]` on each other, what is negative below zero, at one of some places."""
-    which, of = place
-    offset, width = (which - 0.5 * (of - 1)) * 0.8 / of, 0.8 / of
+    """Draws rows `[P, N+1]` on each other, what is negative below zero (see `bars.draw_bars`)."""
     for side in (rows.clip(min=0.0), rows.clip(max=0.0)):
         for p in reversed(range(len(rows))):  # the sum of the first ones is in front
-            pile, same = side[: p + 1].sum(axis=0), [colours[p]] * axis.num_components
-            is_told = p + 1 < len(rows)
-            bars.draw_bars(ax, pile, axis, same, scale, told=is_told, offset=offset, width=width)
+            pile, own = side[: p + 1].sum(axis=0), [colours[p]] * rows.shape[1]
+            bars.draw_bars(ax, pile, axis, own, scale, told=p + 1 < len(rows), **how)
 
 
 def _veiled(ax: Axes, axis: TimeAxis, reach: int, title: str) -> Axes:
     ends = style.positions(axis)[[reach, -1]] + (-0.5, 0.5)
     ax.axvspan(*ends, color=style.EVIDENCE["open"], alpha=_VEIL, linewidth=0, zorder=4)
-    ax.yaxis.set_major_locator(MaxNLocator(nbins=3))
+    ax.yaxis.set_major_locator(MaxNLocator(nbins=4))
     ax.set_title(title, fontsize=style.TITLE, loc="left")
     return ax

@@ -131,8 +131,8 @@ def test_who_asks_what_it_expects_is_told_to_fit_it(trdlab, tmp_path, command):
          "Nothing says where 'mine.zip' acts: it is a PPO of Stable-Baselines3 2.3.0. Give its "
          "--env: it needs observations of shape (4,) and 2 actions."),
         (("mine.zip", "--env", "Acrobot-v1"),
-         "'Acrobot-v1' does not fit 'mine': it has 6 float32 to see and 3 actions. This PPO needs "
-         "observations of shape (4,) and 2 actions."),
+         "'Acrobot-v1' does not fit 'mine': it has 6 float32 to see and 3 actions (torque -1, "
+         "torque 0, torque +1). This PPO needs observations of shape (4,) and 2 actions."),
         (("mine.zip", "--env", "FrozenLake-v1"), "it has 16 states to see and 4 actions"),
         (("mine.zip", "--env", "CartPol-v1"), "Did you mean 'CartPole-v1'"),
         (("mine.zip,tanh=1", *CARTPOLE), "An agent's file takes no argument 'tanh'"),

@@ -80,7 +80,8 @@ def test_the_coins_are_paid_once_each_and_the_last_one_ends_the_episode():
     assert [reward for _, reward, *_ in steps] == [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0]
     assert [terminated for _, _, terminated, *_ in steps] == [False] * 6 + [True]
     assert not any(truncated for *_, truncated, _ in steps)
-    assert steps[-1][-1] == {"row": 2, "column": 4, "collected": 4}
+    parts = {"coin": 1.0, "treasure": 0.0}
+    assert steps[-1][-1] == {"row": 2, "column": 4, "collected": 4, "parts": parts}
 
 
 def test_transitions_come_as_often_as_the_model_says():

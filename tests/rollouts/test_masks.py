@@ -174,7 +174,7 @@ def test_what_is_no_mask_is_refused(mask, message):
 def test_what_is_fitted_to_has_never_seen_a_closed_door():
     keen = agent(terminates=False)
     experience = gather(keen.make, Memoryless(tempted), Worth.future, steps=200, share=0.4)
-    closed = experience.observations[:, :3] == 0
+    closed = experience.frames[:, :3] == 0
     assert closed.any(axis=1).mean() > 0.5
     assert not experience.probabilities[closed].any()
     np.testing.assert_allclose(experience.probabilities.sum(axis=1), 1.0)

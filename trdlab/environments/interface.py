@@ -7,7 +7,7 @@ from typing import Any, Self
 import gymnasium as gym
 import numpy as np
 
-from trdlab.environments.naming import is_numbered, numbered
+from trdlab.environments.naming import are_own, is_numbered, numbered
 from trdlab.environments.protocol import Environments
 from trdlab.environments.stack import observation_space
 from trdlab.errors import InputError
@@ -69,13 +69,13 @@ class Interface:
     def unlike(self, other: "Interface") -> tuple[str, str] | None:
         """Returns the words for what differs between the two, None where all is the same.
 
-        Names of actions are compared where both have some.
+        Names of actions are compared where both have some of their own.
         """
         if self.seen != other.seen:
             return self.seen, other.seen
         if len(self.action_names) != len(other.action_names):
             return self.done, other.done
-        named = not is_numbered(self.action_names) and not is_numbered(other.action_names)
+        named = are_own(self.action_names) and are_own(other.action_names)
         if named and self.action_names != other.action_names:
             return self.done, other.done
         return None

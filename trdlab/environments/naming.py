@@ -35,6 +35,15 @@ def is_numbered(names: Sequence[str]) -> bool:
     return first.isdecimal() and tuple(names) == numbered(len(names), int(first))
 
 
+def are_own(names: Sequence[str]) -> bool:
+    """Returns whether these are names that an environment or a user has given.
+
+    >>> are_own(("action 1", "action 2")), are_own(("push left", "push right")), are_own(("a", "b"))
+    (False, False, True)
+    """
+    return not is_numbered(names) and tuple(names) not in _KNOWN.values()
+
+
 def action_names(env: Any, sizes: Sequence[int], first: int = 0) -> tuple[str, ...]:
     """Returns A names: what an environment calls its actions, or else their numbers.
 

@@ -131,7 +131,7 @@ class Gridworld:
 
         >>> from trdlab.gridworld.gridmap import load_map
         >>> list(Gridworld(load_map("ledge")).parts)
-        ['exit', 'hazard', 'step']
+        ['coin', 'hazard']
         """
         names = [source.kind for source in self.sources]
         return {

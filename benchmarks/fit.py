@@ -39,7 +39,6 @@ FUTURE = Future("the given policy")
 UNPAID = "unpaid end"
 SHARE = {"mixed": 0.3, "td": 0.3, "regression": 0.1}
 """Of forced actions: what comes after the next one is of no use for regression."""
-STEPS = {"FrozenLake": 2_000_000, "drone": 300_000, "ledge": 300_000}
 Parts = dict[str, np.ndarray]
 
 
@@ -127,20 +126,20 @@ def _table(mdp: MDP, policy: np.ndarray) -> np.ndarray:
     return exact(mdp, AXIS, policy=policy).decomposition.components
 
 
-def truth(steps: int | None, seeds: int) -> None:
+def truth(names: list[str], steps: int, seeds: int) -> None:
     """Prints the errors of every method, the worst of all seeds."""
     kinds = ["components", "variance", "survival", "parts", "event"]
     print(f"| world | policy | method | {' | '.join(kinds)} | seconds |")
     print(f"|---|---|---|{'--:|' * (len(kinds) + 1)}", flush=True)
-    for name, (mdp, _) in worlds().items():
+    for name in names:
+        mdp = worlds()[name][0]
         for kind in policies(mdp, 0):
             worst = {method: dict.fromkeys(kinds, 0.0) for method in METHODS}
             took = dict.fromkeys(METHODS, 0.0)
             for seed in range(seeds):
                 policy = policies(mdp, seed)[kind]
-                count = steps or STEPS[name]
                 seen = {
-                    share: played(name, policy, count, seed, share) for share in {*SHARE.values()}
+                    share: played(name, policy, steps, seed, share) for share in {*SHARE.values()}
                 }
                 for method in METHODS:
                     began = time.perf_counter()
@@ -226,7 +225,8 @@ def _seconds(update: Callable[[], object], count: int) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, help=f"By default {STEPS}.")
+    parser.add_argument("--steps", type=int, help="By default 2,000,000; for --cost 50,000.")
+    parser.add_argument("--worlds", nargs="*", default=[*worlds()])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--cost", action="store_true")
     options = parser.parse_args()
@@ -234,7 +234,7 @@ def main() -> None:
     if options.cost:
         cost(options.steps or 50_000)
     else:
-        truth(options.steps, options.seeds)
+        truth(options.worlds, options.steps or 2_000_000, options.seeds)
 
 
 if __name__ == "__main__":

@@ -88,7 +88,8 @@ class Fit:
         ends = np.array([np.minimum(paid.min(axis=0), 0.0), np.maximum(paid.max(axis=0), 0.0)])
         most = np.append(np.ones(axis.horizon), 1.0 / (1.0 - axis.gamma**axis.width))
         self.possible = ends[..., None] * (axis.discounts * most)  # [2, C, N+1]
-        _standardise(self.network, experience.frames[self._learned])
+        if isinstance(self.network, VectorNetwork) and self.network.num_states is None:
+            self.network.standardise(experience.frames[self._learned])
         self.target_network = deepcopy(self.network)
         self.optimizer = torch.optim.Adam(
             self.network.parameters(), lr=self._learning_rate, fused=True
@@ -341,16 +342,3 @@ class Fit:
         known = np.column_stack([ahead.known(self.axis), rest])[:, None]
         constant = (came * known).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
         return rows, came, known, constant
-
-
-def _standardise(network: DecompositionNetwork, observations: Any) -> None:
-    """Scales the inputs of a network for vectors as they were seen."""
-    if isinstance(network, VectorNetwork) and network.num_states is None:
-        seen = observations.reshape(len(observations), -1).astype(np.float64)  # [M, F]
-        spread = seen.std(axis=0)
-        network.middle.copy_(_tensor(seen.mean(axis=0)))
-        network.scale.copy_(_tensor(1.0 / np.where(spread > 1e-8, spread, 1.0)))
-
-
-def _tensor(array: Any) -> torch.Tensor:
-    return torch.from_numpy(np.array(array, dtype=np.float32))

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from trdlab.arrays import FloatArray
@@ -170,6 +171,13 @@ class VectorNetwork(DecompositionNetwork):
             middle[known], scale[known] = (low + high) / 2.0, 2.0 / (high - low)
         self.register_buffer("middle", torch.as_tensor(middle, dtype=torch.float32))
         self.register_buffer("scale", torch.as_tensor(scale, dtype=torch.float32))
+
+    def standardise(self, seen: NDArray[Any]) -> None:
+        """Makes inputs like these `[M, ...]` have mean 0 and deviation 1."""
+        inputs = seen.reshape(len(seen), -1).astype(np.float64)  # [M, F]
+        spread = inputs.std(axis=0)
+        self.middle.copy_(torch.as_tensor(inputs.mean(axis=0)))
+        self.scale.copy_(torch.as_tensor(1.0 / np.where(spread > 1e-8, spread, 1.0)))
 
     def preprocess(self, observations: Tensor) -> Tensor:
         """Returns `[B, F]`: flattened, or one-hot."""

@@ -36,7 +36,7 @@ def contrast(choice: Choice) -> list[Claim]:
     worth = every(choice, *totals) + first(choice, *values)
     if same_all_along := every(choice, *alike):
         return same_all_along + worth
-    if doubt := every(choice, untested_difference):
+    if doubt := every(choice, *untested_difference):
         return worth[-1:] + doubt + worth[:-1]
     passing, decided = every(choice, *turns), every(choice, decided_at)
     rest = every(choice, never_behind, reasons)
@@ -150,11 +150,16 @@ def alike(choice: Choice) -> Iterator[Found]:
             yield "same-rewards" if is_all_told else "same-components", fields
 
 
-@CHOICES.rule(
-    "{share:percent} of the difference between {action} and {foil} comes {components:whens}, and "
-    "that {state:text}."
+@CHOICES.kinds(
+    {
+        "untested-difference": (
+            "{share:percent} of the difference between {action} and {foil} comes "
+            "{components:whens}, and that {state:text}."
+        ),
+        "nothing-tested": "What tells {action} and {foil} apart {state:text}, all of it.",
+    }
 )
-def untested_difference(choice: Choice) -> Iterator[Fields]:
+def untested_difference(choice: Choice) -> Iterator[Found]:
     for action, foil in choice.orders[:1]:
         size = np.abs(choice.moment.difference(action, foil))
         doubt = doubtful(choice.moment, action) | doubtful(choice.moment, foil)
@@ -164,8 +169,11 @@ def untested_difference(choice: Choice) -> Iterator[Fields]:
             known = (choice.moment.judged(name) for name in (action, foil))
             states = {of.status[i] for of in known if of is not None for i in components}
             state = "was not tested" if states <= {"good", "not tested"} else "is not to be trusted"
-            about = {"share": share, "action": action, "foil": foil, "state": state}
-            yield about | {"components": components}
+            about = {"action": action, "foil": foil, "state": state}
+            if share == 1.0:
+                yield "nothing-tested", about
+            else:
+                yield "untested-difference", about | {"share": share, "components": components}
 
 
 @CHOICES.rule(

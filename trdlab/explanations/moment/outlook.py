@@ -28,7 +28,7 @@ def forecast(choice: Choice) -> list[Claim]:
 
 def contrast(choice: Choice) -> list[Claim]:
     """Returns what else is expected otherwise of its foil, if differences are to be trusted."""
-    return [] if every(choice, untested_difference) else every(choice, decides, outcomes[-1])
+    return [] if every(choice, *untested_difference) else every(choice, decides, outcomes[-1])
 
 
 def in_brief(choice: Choice) -> list[Claim]:

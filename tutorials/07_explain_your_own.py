@@ -182,7 +182,7 @@ lost.plot()
 # **Look at the diamonds.** They are no forecast. trdlab copied the game at this step, 50 times for
 # each action, pushed, and let the agent go on. So the diamonds are what really came of the
 # difference. They stand close to the bars. That tests just this forecast, at this moment, of an
-# action that the agent does not often take here.
+# action that the agent takes less often here.
 #
 # ## 6. A moment when all is well
 #

@@ -165,11 +165,15 @@ def test_a_residual_that_swamps_the_rest_is_cut_off_and_said():
     assert cut_texts(moment_figure(Choice(unsure, "go", "stay")).axes[0]) == ["94.50"]
 
 
-@pytest.mark.parametrize("residual", [3.0, 8.0, 10.0, 20.0])
-def test_bars_can_be_seen_beside_any_residual(residual):
-    ax = plot_components(Figure().subplots(), np.array([1.0, 1.0, 0.9, residual]), AXIS)
-    assert heights(ax)[0] / ax.get_ylim()[1] > 0.1
-    assert heights(ax)[-1] == residual or cut_texts(ax) == [f"{residual:.2f}"]
+@pytest.mark.parametrize("residual", [3.0, 4.0, 5.3, 10.0, 20.0])
+def test_bars_can_be_seen_beside_any_residual_and_its_whisker(residual):
+    off_by = [0.1, 0.1, 0.1, residual]
+    unsure = moment([[1.0, 1.0, 0.9, residual]] * 2, calibration=calibrated(AXIS, off_by=off_by))
+    ax = plot_action(Figure().subplots(), unsure, "go")
+    low, high = ax.get_ylim()
+    assert 1.0 / (high - low) > 0.1
+    assert residual <= 4.0 or 1.0 / (high - low) > 0.25
+    assert heights(ax)[-1] == residual or f"{residual:.2f}" in cut_texts(ax)
 
 
 @pytest.mark.parametrize("horizon", [1, 4, 25, 30, 40, 60, 100])
@@ -182,6 +186,18 @@ def test_labels_of_steps_stand_apart(horizon, width):
     boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
     assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
     assert ax.get_xticklabels()[-1].get_text() == axis.labels[-1]
+
+
+def test_a_bar_and_its_whisker_that_are_both_cut_off_have_a_number_each():
+    long = moment(
+        [[1.0, 1.0, 0.9, 5.3]] * 2, calibration=calibrated(AXIS, off_by=[0.1] * 3 + [9.8])
+    )
+    figure = style.new_figure(3.0)
+    ax = plot_action(figure.subplots(), long, "go")
+    assert sorted(cut_texts(ax)) == ["15.10", "5.30", "−4.50"]
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in ax.texts if text.get_gid() == CUT]
+    assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
 def test_a_residual_is_shown_whole_where_the_rest_is_next_to_nothing():

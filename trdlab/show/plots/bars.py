@@ -4,7 +4,7 @@ The scale is that of the bars. What does not fit on it ends at an arrow with its
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,10 +21,11 @@ CUT = "cut"
 
 _MOST_LETTERS = 46  # of all numbers above one row of bars
 _MOST_CUTS = 4  # whiskers that are cut get a number each; of more only the furthest does
-_SWAMPS = 8.0  # times the largest explicit component, from which on a residual is cut off
+_SWAMPS = 4.0  # times the largest explicit component, from which on a residual is cut off
 _MATTERS = 0.01  # of the residual: explicit components that add up to less do not set the scale
 _ROOM = 1.5  # times the largest explicit component, that is shown then
 _REACH = 2.5  # times the bars, beyond which whiskers are cut off
+_LINE = 13.0  # points from one number to the next below it
 _MARGIN = 0.08  # of the scale, free at both ends
 
 
@@ -197,7 +198,14 @@ def _cut(ax: Axes, x: float, value: float, scale: Scale, colour: str, *, is_told
     at = (x, scale.high if up else scale.low)
     ax.plot(*at, "^" if up else "v", color=colour, markersize=6, clip_on=False, zorder=6)
     if not is_told:
-        text, shift = style.told(value, decimals_for([value])), (-6 if is_right else 6, 0)
+        above = sum(note.get_gid() == CUT and _meet(note, at) for note in ax.texts)  # as of a bar
+        shift = (-6 if is_right else 6, (-1 if up else 1) * _LINE * above)
+        text = style.told(value, decimals_for([value]))
         side = {"ha": "right" if is_right else "left", "va": "top" if up else "bottom"}
         box = {"fc": "white", "ec": "none", "alpha": 0.85, "pad": 0.4}
         style.note(ax, text, at, shift, gid=CUT, bbox=box, **side)
+
+
+def _meet(note: Any, at: style.Point) -> bool:
+    """Returns whether a note belongs to the same end of the same component."""
+    return bool(abs(note.xy[0] - at[0]) < 0.5 and note.xy[1] == at[1])

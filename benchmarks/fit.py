@@ -14,6 +14,7 @@ import argparse
 import time
 from collections.abc import Callable
 from functools import cache
+from itertools import cycle
 
 import gymnasium as gym
 import numpy as np
@@ -178,7 +179,8 @@ def cost(steps: int) -> None:
     for method in METHODS:
         whole = Fit(experience, space, TimeAxis(0.99, 40), FitSettings(method))
         plain = Fit(experience, space, TimeAxis(0.99, 0), FitSettings(method))
-        rounds = [_round(whole, plain) for _ in range(7)]
+        bare_update = _bare(whole)
+        rounds = [_round(whole, bare_update, plain) for _ in range(7)]
         own, bare, value = np.median(rounds, axis=0) * 1e3
         print(
             f"{method:>10}, N = 40: {own:.2f} ms an update; {own / bare:.2f} times bare regression "
@@ -187,27 +189,23 @@ def cost(steps: int) -> None:
         )
 
 
-def _round(whole: Fit, plain: Fit, count: int = 200) -> tuple[float, float, float]:
+def _round(
+    whole: Fit, bare: Callable[[], object], plain: Fit, count: int = 200
+) -> tuple[float, float, float]:
     """Returns the seconds of an update of a fit, of bare regression, and of a fit with N = 0."""
-    return (
-        _seconds(whole.update, count),
-        _seconds(_bare(whole), count),
-        _seconds(plain.update, count),
-    )
+    return (_seconds(whole.update, count), _seconds(bare, count), _seconds(plain.update, count))
 
 
 def _bare(fit: Fit) -> Callable[[], object]:
-    """Returns an update of a fit's network towards targets that are there already."""
-    shape = (fit.settings.batch_size, *fit.scale.shape)
-    batch = torch.from_numpy(fit.experience.frames[: fit.settings.batch_size])
-    target = torch.zeros(shape)  # [K, C, N+1]
-    actions = torch.from_numpy(fit.experience.actions[: fit.settings.batch_size])
-    network = fit.network
-    optimizer = torch.optim.Adam(network.parameters(), lr=0.0, fused=True)
+    """Returns an update of a fit's network on its own batches, whose targets are there already."""
+    batches = cycle(zip(*fit._drawn(fit.settings.sync_every), strict=True))
+    optimizer = torch.optim.Adam(fit.network.parameters(), lr=0.0, fused=True)
 
     def update() -> float:
-        told = network(batch).reshape(shape[0], -1, *shape[1:])[range(shape[0]), actions]
-        loss = (told - target).square().sum() / shape[0]
+        rows, target, weight = next(batches)
+        told = fit._components(fit.network, rows)[range(len(rows)), fit._actions(rows)]
+        apart = (told - torch.from_numpy(target)).square() * torch.from_numpy(weight)
+        loss = apart.sum() / len(rows)
         optimizer.zero_grad(set_to_none=True)
         loss.backward()
         optimizer.step()

@@ -182,6 +182,9 @@ def test_outcomes_are_named_on_the_command_line(tmp_path, monkeypatch, capsys):
     assert (list(outlook.parts), list(outlook.amounts)) == (["coin", "hazard"], ["fell"])
     code, _, err = run(capsys, *words, "--outcome", "row")
     assert (code, err) == (2, "error: The outcome is 'row'. Write it as NAME=info.KEY.\n")
+    code, _, err = run(capsys, *words, *parts, "--outcome", "coin=info.parts.hazard")
+    assert code == 2
+    assert "'coin' is the name of a part and of an outcome. Give each a name of its own." in err
     code, _, err = run(capsys, *words, "--part", "coin=info.parts.coin")
     assert code == 2
     assert "The parts do not add up to the reward" in err

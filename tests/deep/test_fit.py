@@ -234,6 +234,18 @@ def test_parts_add_up_and_each_is_what_the_exact_table_of_it_says():
     np.testing.assert_allclose(outlook.events["fell"], chances, atol=0.03)
 
 
+def test_what_hardly_ever_comes_is_not_blown_up():
+    """Else the few steps before it teach so much at once that all else is forgotten."""
+    rewards = [1.0, 0.0] * 500
+    of = experience(rewards, [FAR] * 1000)
+    rare = np.zeros((1001, 1))
+    rare[700] = 1.0
+    twice = replace(of, outcomes=rare, last=np.repeat([499, 1000], [500, 501]))
+    fit = Fit(twice, gym.spaces.Discrete(1001), TimeAxis(0.9, 3), names=("crash",))
+    at = [channel.name for channel in fit.channels].index("crash")
+    np.testing.assert_allclose(fit.scale[at, :3], 0.05 * 0.9 ** np.arange(3), rtol=1e-6)
+
+
 def test_a_fit_that_was_stopped_goes_on_to_the_bit():
     of, how = played(steps=3_000), FitSettings(most_updates=600, batch_size=64)
 

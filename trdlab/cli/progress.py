@@ -6,17 +6,17 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+
+from trdlab.verbs.watching import LINE_SECONDS, Bar
 
 if TYPE_CHECKING:
     from trdlab.deep.trainer import Trainer, TrainMetrics
     from trdlab.rollouts.playing import Progress as Playing
 
-_LINE_SECONDS = 10.0
-_BAR_SECONDS = 0.1
 _HANGUP = getattr(signal, "SIGHUP", None)  # Windows has none
 
 
@@ -58,7 +58,7 @@ def stopping() -> Iterator[Stop]:
             signal.signal(number, handler)
 
 
-class TrainingProgress:
+class TrainingProgress(Bar):
     """Shows a training run: steps, speed, time left, score and loss.
 
     Args:
@@ -68,30 +68,20 @@ class TrainingProgress:
     """
 
     def __init__(self, console: Console, total: int, done: int = 0) -> None:
-        self._console, self._total = console, total
-        self._first, self._begun = done, time.monotonic()
-        self._shown, self._state = 0.0, "score –, loss –"
-        self._bar: Progress | None = None
-        if console.is_terminal:
-            columns: tuple[Any, ...] = (
-                BarColumn(bar_width=None),
-                TextColumn("{task.fields[steps]}"),
-                TimeRemainingColumn(compact=True),
-                TextColumn("{task.fields[state]}", markup=False),
-            )
-            self._bar = Progress(*columns, console=console, expand=True, transient=True)
-            self._task = self._bar.add_task(
-                "", total=total, completed=done, steps="", state=self._state
-            )
-
-    def __enter__(self) -> "TrainingProgress":
-        if self._bar is not None:
-            self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        self._total, self._first, self._begun = total, done, time.monotonic()
+        self._state = "score –, loss –"
+        super().__init__(
+            console,
+            BarColumn(bar_width=None),
+            TextColumn("{task.fields[steps]}"),
+            TimeRemainingColumn(compact=True),
+            TextColumn("{task.fields[state]}", markup=False),
+            description="",
+            total=total,
+            completed=done,
+            steps="",
+            state=self._state,
+        )
 
     def on_metrics(self, metrics: "TrainMetrics") -> None:
         """Takes note of score and loss."""
@@ -101,19 +91,14 @@ class TrainingProgress:
 
     def on_step(self, trainer: "Trainer") -> None:
         """Shows where the run stands, if it is time to."""
-        now = time.monotonic()
-        if now - self._shown < (_BAR_SECONDS if self._bar else _LINE_SECONDS):
+        if not self.is_due():
             return
-        self._shown = now
         done = trainer.agent_steps
-        steps = f"{done:,} of {self._total:,} steps{self._speed(done, now)}"
-        if self._bar is not None:
-            self._bar.update(self._task, completed=done, steps=steps, state=self._state)
-        else:
-            self._console.print(f"{steps}, {self._state}", soft_wrap=True, markup=False)
+        steps = f"{done:,} of {self._total:,} steps{self._speed(done)}"
+        self.show(f"{steps}, {self._state}", completed=done, steps=steps, state=self._state)
 
-    def _speed(self, done: int, now: float) -> str:
-        passed = now - self._begun
+    def _speed(self, done: int) -> str:
+        passed = time.monotonic() - self._begun
         return f", {(done - self._first) / passed:,.0f}/s" if passed > 1.0 else ""
 
 
@@ -146,6 +131,6 @@ class EpisodeProgress:
         )
         if self._status is not None:
             self._status.update(line)
-        elif time.monotonic() - self._shown >= _LINE_SECONDS:
+        elif time.monotonic() - self._shown >= LINE_SECONDS:
             self._shown = time.monotonic()
             self._console.print(line, soft_wrap=True, markup=False)

@@ -175,5 +175,5 @@ def check_parts(
         raise InputError(
             f"The parts do not add up to the reward: {told} = {total[at]:g}, and the reward is "
             f"{rewards[at]:g} ({len(wrong)} of {int(steps.sum())} steps).",
-            "Name all parts, or name them as `outcomes` only.",
+            "Name all of them, or call them outcomes and no parts.",
         )

@@ -252,7 +252,12 @@ def fit(
     if own is None:
         own = frozen.estimator.time_axis.gamma if frozen.is_fitted else 0.99
     axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)
-    read, made_of = Outcomes(dict(parts or {}) | dict(outcomes or {})), tuple(parts or ())
+    made_of, beside = dict(parts or {}), dict(outcomes or {})
+    if twice := sorted(made_of.keys() & beside.keys()):
+        raise InputError(
+            f"'{twice[0]}' is the name of a part and of an outcome.", "Give each a name of its own."
+        )
+    read = Outcomes(made_of | beside)
     found, of = None, frozen.origin
     plan = fitted.Plan(
         agent=None if of is None else of.name,
@@ -263,7 +268,7 @@ def fit(
         steps=steps,
         share=share,
         outcomes=read.places,
-        parts=made_of,
+        parts=tuple(made_of),
         settings=chosen,
     )
     if out is not None:
@@ -293,7 +298,7 @@ def fit(
 
     def begun(experience: Experience) -> Fit:
         space = frozen.interface.space
-        return Fit(experience, space, axis, chosen, names=read.names, parts=made_of)
+        return Fit(experience, space, axis, chosen, names=read.names, parts=tuple(made_of))
 
     def kept() -> "RunFolder":
         return fitted.new_fit(Path(str(out)), plan, frozen.interface, future)

@@ -303,6 +303,9 @@ def test_a_difference_that_cannot_be_trusted_is_not_discussed():
     (untested,) = of_kind(moment(rows, calibration=silent).choice("a", "b"), "untested-difference")
     assert untested.sentence.endswith("and that was not tested.")
     assert not of_kind(of, "reasons")
+    nothing = calibrated(axis, ("open",) * 4)
+    (whole,) = of_kind(moment(rows, calibration=nothing).choice("a", "b"), "untested-whole")
+    assert whole.sentence == "What tells a and b apart is not to be trusted, all of it."
     sure = moment(rows, calibration=trusted(axis, 3, residual=True)).choice("a", "b")
     assert of_kind(sure, "reasons")
     assert not of_kind(sure, "untested-difference")

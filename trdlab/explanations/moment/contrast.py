@@ -156,7 +156,7 @@ def alike(choice: Choice) -> Iterator[Found]:
             "{share:percent} of the difference between {action} and {foil} comes "
             "{components:whens}, and that {state:text}."
         ),
-        "nothing-tested": "What tells {action} and {foil} apart {state:text}, all of it.",
+        "untested-whole": "What tells {action} and {foil} apart {state:text}, all of it.",
     }
 )
 def untested_difference(choice: Choice) -> Iterator[Found]:
@@ -171,7 +171,7 @@ def untested_difference(choice: Choice) -> Iterator[Found]:
             state = "was not tested" if states <= {"good", "not tested"} else "is not to be trusted"
             about = {"action": action, "foil": foil, "state": state}
             if share == 1.0:
-                yield "nothing-tested", about
+                yield "untested-whole", about
             else:
                 yield "untested-difference", about | {"share": share, "components": components}
 

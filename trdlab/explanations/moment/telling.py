@@ -44,8 +44,9 @@ def in_brief(choice: Choice) -> list[Claim]:
 def _why(choice: Choice) -> str:
     if choice.foil is None:
         return f"Why {choice.action}"
-    chances = choice.moment.policy
-    if chances is None or chances[choice.moment.index(choice.action)] > 0.0:
+    moment = choice.moment
+    is_taken = moment.policy is None or moment.policy[moment.index(choice.action)] > 0.0
+    if is_taken and moment.q_value(choice.action) >= moment.q_value(choice.foil):
         return f"Why {choice.action}, not {choice.foil}"
     return f"How {choice.action} differs from {choice.foil}"
 

@@ -12,6 +12,7 @@ from trdlab.errors import InputError
 from trdlab.formatting import decimals_for, number
 from trdlab.time_axis import TimeAxis as TimeAxis
 from trdlab.time_axis import axis_title
+from trdlab.undiscounting import bounds
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -228,25 +229,7 @@ class RewardDecomposition:
             mirrored = RewardDecomposition(-self.components, self.time_axis)
             low, high = mirrored.undiscounted_bounds(-highest, math.inf)
             return -high, -low
-        gamma, width = self.time_axis.gamma, self.time_axis.width
-        weights = gamma ** np.arange(width)  # [w]
-        own_start = self.components / self.time_axis.discounts  # [..., N+1], from each own start
-        totals = np.full(self.time_axis.num_components, weights.sum())
-        totals[-1] = 1.0 / (1.0 - gamma)  # of the endless weights of the residual
-        _check_range(own_start, lowest * totals, highest * totals)
-        excess = own_start[..., :-1] - lowest * totals[:-1]  # [..., N], above the least there is
-        low = lowest * width + _filled(excess, weights, highest - lowest)
-        high = lowest * width + _filled(excess, weights[::-1], highest - lowest)
-        tail = own_start[..., -1:]
-        low_tail, high_tail = np.full_like(tail, -np.inf), np.full_like(tail, np.inf)
-        if lowest >= 0.0:
-            low_tail, high_tail = tail, np.where(tail == 0.0, 0.0, np.inf)
-        elif highest <= 0.0:
-            low_tail, high_tail = np.where(tail == 0.0, 0.0, -np.inf), tail
-        return (
-            np.concatenate([low, low_tail], axis=-1),
-            np.concatenate([high, high_tail], axis=-1),
-        )
+        return bounds(self.components, self.time_axis, lowest, highest)
 
     def to_dict(self) -> dict[str, Any]:
         """Returns plain Python data at full precision, with the version of its schema."""
@@ -331,26 +314,3 @@ class RewardDecomposition:
                 "later rewards cannot be read back.",
                 "Choose a smaller horizon N.",
             )
-
-
-def _check_range(sums: FloatArray, least: FloatArray, most: FloatArray) -> None:
-    """Refuses sums outside their range by more than rounding (that of their own precision)."""
-    ends = [np.where(np.isfinite(end), np.abs(end), 0.0) for end in (least, most)]
-    scale = np.maximum(np.maximum(*ends), np.abs(sums))
-    slack = max(1e-9, 32 * float(np.finfo(sums.dtype).eps)) * np.maximum(1.0, scale)
-    if np.any(sums < least - slack) or np.any(sums > most + slack):
-        raise InputError(
-            "Rewards in this range cannot add up to these components.",
-            "Widen the range of a single reward.",
-        )
-
-
-def _filled(excess: FloatArray, weights: FloatArray, room: float) -> FloatArray:
-    """Returns the undiscounted sum if `excess` is paid into the steps in the order of `weights`."""
-    paid = np.zeros_like(excess)
-    left = np.maximum(excess, 0.0)
-    for weight in weights:
-        here = np.minimum(left / weight, room)
-        paid = paid + here
-        left = np.maximum(left - here * weight, 0.0)
-    return paid

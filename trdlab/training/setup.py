@@ -21,7 +21,9 @@ from trdlab.runs import read_config
 from trdlab.training.machine import check_threads, memory_of, resolved, use_threads
 
 if TYPE_CHECKING:
+    from trdlab.deep.lessons import Levels
     from trdlab.deep.trainer import Trainer
+    from trdlab.policies.teacher import Teacher
 
 _MEASURED_SECONDS = 3.0
 
@@ -113,12 +115,16 @@ def _made(settings: TrainSettings, num_envs: int | None, seed: int | None) -> En
     return GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments)
 
 
-def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer":
+def new_trainer(
+    settings: TrainSettings,
+    environments: Environments,
+    teacher: "tuple[Teacher, Levels] | None" = None,
+) -> "Trainer":
     """Returns the trainer of a run, and lets PyTorch use as many threads as it should."""
     from trdlab.deep.trainer import Trainer
 
     use_threads(settings)
-    return Trainer(settings, environments)
+    return Trainer(settings, environments, teacher)
 
 
 def describe(environments: Environments) -> dict[str, Any]:
@@ -134,6 +140,9 @@ def describe(environments: Environments) -> dict[str, Any]:
 def future(settings: TrainSettings) -> Future:
     """Returns whose future the agent of a run tells: which policy, which reward, which ending."""
     policy = "the greedy policy of the network"
+    if settings.distil == "policy":
+        how = "drawing its actions" if settings.draw else "its likeliest action each time"
+        policy = f"the policy head of the network ({how})"
     if settings.width > 1:
         policy += f" (for the first {settings.width} steps, the ε-greedy one it learned from)"
     return Future(policy, settings.clip_rewards, settings.life_loss_ends)

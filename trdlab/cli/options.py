@@ -27,7 +27,7 @@ def with_settings(kind: Kind) -> Callable[[Callable[..., Any]], Callable[..., An
             for parameter in inspect.signature(command, eval_str=True).parameters.values()
             if parameter.name != "given"
         ]
-        options = {key: _option(key, shown.get(key)) for key in _keys()}
+        options = {key: _option(key, shown.get(key, of.default)) for key, of in _keys().items()}
         signature = inspect.Signature([*own, *options.values()])
 
         def run(**values: Any) -> Any:

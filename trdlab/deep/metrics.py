@@ -1,9 +1,23 @@
 """What a run tells of itself every now and then: the lines of its metrics."""
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from trdlab.deep.lessons import Phase
+
+
+class Standing(NamedTuple):
+    """How far a run is in its phase.
+
+    Args:
+        done: so many are done in it.
+        total: of so many.
+        what: of what.
+    """
+
+    done: int
+    total: int
+    what: str
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from trdlab.arrays import IntArray
 from trdlab.deep.exploring import Exploring
 from trdlab.deep.lessons import TAUGHT, Lessons, Levels, Phase
 from trdlab.deep.loss import acted
-from trdlab.deep.metrics import TeachingMetrics
+from trdlab.deep.metrics import Standing, TeachingMetrics
 from trdlab.deep.metrics import TrainMetrics as TrainMetrics
 from trdlab.deep.networks import build_network
 from trdlab.deep.replay import ReplayBuffer
@@ -81,6 +81,16 @@ class Trainer:
         taught = self.lessons
         before = taught.teacher_steps + taught.offline_updates if taught else 0
         return before + self.agent_steps
+
+    @property
+    def standing(self) -> Standing:
+        """How far it is in this phase."""
+        settings, of = self.settings, self.lessons
+        if of and of.phase == "teacher":
+            return Standing(of.teacher_steps, settings.teacher_steps, "steps of the teacher")
+        if of and of.phase == "offline":
+            return Standing(of.offline_updates, settings.offline_updates, "offline updates")
+        return Standing(self.agent_steps, settings.agent_steps, "steps")
 
     @property
     def done(self) -> bool:

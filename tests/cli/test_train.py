@@ -26,7 +26,7 @@ from trdlab.agents import find_agent
 from trdlab.cli import main
 from trdlab.cli.options import flag
 from trdlab.cli.progress import EpisodeProgress, TrainingProgress, stopping
-from trdlab.deep.presets import PRESETS, preset
+from trdlab.deep.presets import PRESETS, preset, with_teacher
 from trdlab.rollouts.playing import Progress
 from trdlab.runs import RunFolder, checkpoint_steps
 from trdlab.training.loading import load
@@ -88,10 +88,11 @@ def test_the_help_has_every_setting_under_its_heading(trdlab, kind):
     panels = re.split(r"╭─ (.+?) ─+╮", out)
     shown = dict(zip(panels[1::2], panels[2::2], strict=True))
     assert list(shown) == [
-        "Arguments", "Options", "Run", "Time axis", "Acting", "Learning", "Reward and ending",
-        "Evaluation", "Running",
+        "Arguments", "Options", "Run", "Time axis", "Acting", "Learning", "Learning from a teacher",
+        "Reward and ending", "Evaluation", "Running",
     ]  # fmt: skip
-    keys = [*preset(kind, "X").to_config(), "learning_rate_end", "max_grad_norm", "weights"]
+    taught = preset(kind, "X").changed({"teacher": "ppo.zip"}).to_config()
+    keys = [*taught, "learning_rate_end", "max_grad_norm", "weights"]
     for key in keys[2:]:
         assert re.search(rf"{flag(key)}\b", out), key
     assert "--w " in shown["Time axis"]
@@ -101,6 +102,8 @@ def test_the_help_has_every_setting_under_its_heading(trdlab, kind):
     for name, (about, lines) in PRESETS[kind].items():
         assert f"{name}: {about}" in told
         assert all(key in keys for key in lines)
+    steps = with_teacher(kind, preset(kind, "X"))["teacher_steps"]
+    assert f"of all environments. [default: ({steps})]" in told
     horizon = preset(kind, "X").horizon
     about = rf"Number of explicit components; 0 is DQN\. \[default: \({horizon}\)\]"
     assert re.search(rf"--N (<int>|INTEGER) {about}", told)  # which of them, Typer decides

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -11,7 +10,6 @@ from trdlab.deep.lessons import TAUGHT, Lessons, Levels
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer
 from trdlab.environments import GymEnvironments
-from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.policies import Memoryless
 from trdlab.policies.teacher import Teacher
@@ -176,26 +174,6 @@ def test_a_temperature_evens_out_what_is_taught_and_not_what_is_done():
     told, _ = Teacher(policy, temperature=2.0).ask(np.zeros((1, 4)), None, np.array([True]))
     assert told.likely.tolist() == [[0.2, 0.8]]
     np.testing.assert_allclose(told.taught, [[1 / 3, 2 / 3]])
-
-
-def test_a_teacher_sees_what_is_meant_for_it_where_there_is_such_a_thing():
-    class Paired(GymEnvironments):
-        """Shows the teacher its observations twice as large, and in colour so to speak."""
-
-        @property
-        def teacher_observations(self) -> Any:
-            return np.full((self.num_envs, 3), 7.0)
-
-    policy = Counting()
-    environments = Paired("CartPole-v1", 2, seed=0)
-    stack = FrameStack(environments.reset(), None, "reset")
-    lessons = Lessons(Teacher(policy), Levels(1.0, 0.0), settings(), 2)
-    lessons.ask(environments, stack)
-    assert policy.asked[0][0].tolist() == [[7.0] * 3] * 2
-    plain = GymEnvironments("CartPole-v1", 2, seed=0)
-    lessons.ask(plain, stack)
-    np.testing.assert_array_equal(policy.asked[1][0], stack.observations)
-    assert isinstance(plain.observation_space, gym.spaces.Box)
 
 
 # ---- the same again ------------------------------------------------------------------------------

@@ -37,7 +37,7 @@ def find_teacher(settings: "TrainSettings") -> Candidate:
     else:
         on_scale = getattr(policy, "gamma", None) in (None, settings.gamma)
     values = _sums(agent) if by_estimate else getattr(policy, "q_values", None)
-    return Candidate(name, file, policy, agent.make, values, on_scale)
+    return Candidate(name, file, policy, values, on_scale)
 
 
 def _sums(agent: Agent) -> Any:

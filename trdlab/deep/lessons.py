@@ -14,10 +14,9 @@ from trdlab.arrays import BoolArray, IntArray
 from trdlab.deep.settings import TrainSettings
 from trdlab.environments import Environments
 from trdlab.environments.stack import FrameStack
-from trdlab.environments.teaching import seen_by_teacher
 from trdlab.errors import InputError
 from trdlab.policies.teacher import Lesson, Teacher
-from trdlab.rollouts.playing import any_actions, drawn
+from trdlab.rollouts.playing import any_actions, drawn, shown
 
 TAUGHT = "taught"
 """What the replay memory calls the teacher's probabilities."""
@@ -101,7 +100,7 @@ class Lessons:
     def ask(self, environments: Environments, stack: FrameStack) -> Lesson:
         """Returns what the teacher says now; to be asked once at each step of all episodes."""
         state = None if self._begins.all() else self._remembered
-        seen = seen_by_teacher(environments, stack)
+        seen = shown(self.teacher.policy, environments, stack)
         lesson, self._remembered = self.teacher.ask(seen, state, self._begins)
         return lesson
 

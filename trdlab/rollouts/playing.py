@@ -261,6 +261,17 @@ class Playing:
         return likely
 
 
+def shown(policy: Any, environments: Environments, stack: FrameStack) -> Any:
+    """Returns what a policy looks at in environments `[B, ...]`: what is seen there.
+
+    Args:
+        policy: who looks.
+        environments: where.
+        stack: what is seen.
+    """
+    return stack.observations
+
+
 def any_actions(
     rng: np.random.Generator, count: int, num_actions: int, allowed: BoolArray | None = None
 ) -> IntArray:

@@ -268,7 +268,7 @@ def _trainer(
 ) -> tuple[Trainer, int]:
     """Returns a trainer at its beginning, and the bytes that its replay memory will take."""
     check_board(wanted=settings.tensorboard)
-    environments = make_environments(settings)
+    environments = teacher.make(settings) if teacher else make_environments(settings)
     stack.callback(environments.close)
     if teacher is not None:
         settings = teacher.settled(settings)

@@ -189,7 +189,7 @@ def plan(settings: TrainSettings, find: "FindTeacher | None" = None) -> Plan:
 
     check_threads(settings)
     candidate = find(settings) if find and settings.teacher else None
-    environments = make_environments(settings)
+    environments = candidate.make(settings) if candidate else make_environments(settings)
     try:
         if candidate is not None:
             settings = candidate.settled(settings)

@@ -1,7 +1,9 @@
 """The teacher of a run: measured before anything is written, noted, and found again."""
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import file_digest
 from pathlib import Path
 from typing import Any
@@ -12,13 +14,13 @@ from trdlab.arrays import FloatArray
 from trdlab.deep.lessons import Levels
 from trdlab.deep.settings import TrainSettings
 from trdlab.environments import Environments
-from trdlab.environments.batches import Make
 from trdlab.errors import InputError, TrdlabError
 from trdlab.policies import Memoryless, Policy
 from trdlab.policies.teacher import Teacher
-from trdlab.rollouts.evaluation import Evaluation, score
+from trdlab.rollouts.evaluation import score
 from trdlab.rollouts.playing import Watch, unwatched, usual_limit
 from trdlab.runs import RunFolder
+from trdlab.statistics import Estimate
 from trdlab.training.setup import make_environments
 
 TEACHER_SEED = 3000
@@ -36,18 +38,19 @@ class Candidate:
         name: by which it is found again, wherever the command is given.
         file: what holds it; None where nothing on disk does.
         policy: who acts.
-        make: makes the environments that it acts in by itself.
         values: from observations `[B, ...]` to the value of each action `[B, A]`, where it acts by
             them; else None.
         on_scale: whether these count as the student does: with its γ, and its rewards.
+        beside: what the student's environments are to be made with beside their own arguments, so
+            that they show what this agent looks at; as `KEY=VALUE`.
     """
 
     name: str
     file: Path | None
     policy: Policy
-    make: Make
     values: Callable[[Any], FloatArray] | None
     on_scale: bool
+    beside: tuple[str, ...] = ()
 
     def settled(self, settings: TrainSettings) -> TrainSettings:
         """Returns the settings with what `auto` stands for with this teacher."""
@@ -55,6 +58,13 @@ class Candidate:
         if settings.distil != "auto":
             return settings
         return replace(settings, distil="values" if by_values else "policy")
+
+    def make(
+        self, settings: TrainSettings, num_envs: int | None = None, seed: int | None = None
+    ) -> Environments:
+        """Makes the environments of a run, as it and the student act in them."""
+        both = replace(settings, env_arg=(*settings.env_arg, *self.beside))
+        return make_environments(both, num_envs, seed)
 
     def teacher(self, settings: TrainSettings) -> Teacher:
         """Returns it as the teacher of a run with these settings."""
@@ -91,28 +101,24 @@ def measure(
         InputError: it is not clearly better than random actions.
     """
 
-    def make(num_envs: int, seed: int) -> Environments:
-        return make_environments(settings, num_envs=num_envs, seed=seed)
-
     def evenly(seen: Any) -> FloatArray:
         return np.full((len(seen), num_actions), 1.0 / num_actions)
 
-    def measured(who: Policy, where: Make, epsilon: float) -> Evaluation:
+    def measured(who: Policy, epsilon: float) -> Estimate:
         return score(
             who,
-            where,
+            partial(candidate.make, settings),
             EPISODES,
             epsilon=epsilon,
             enough=usual_limit(settings.time_axis),
             seed=TEACHER_SEED,
             watch=watch,
-        )
+        ).mean
 
-    environments = make(1, TEACHER_SEED)
-    num_actions = environments.num_actions
-    environments.close()
-    teacher = measured(candidate.policy, candidate.make, settings.evaluate_epsilon).mean
-    chance = measured(Memoryless(evenly), make, 0.0).mean
+    with closing(candidate.make(settings, 1)) as environments:
+        num_actions = environments.num_actions
+    teacher = measured(candidate.policy, settings.evaluate_epsilon)
+    chance = measured(Memoryless(evenly), 0.0)
     if teacher.low <= chance.high:
         raise InputError(
             f"The teacher '{candidate.name}' is not clearly better than random actions: in "

@@ -9,7 +9,7 @@ from trdlab.arrays import BoolArray
 from trdlab.deep.lessons import TAUGHT, Lessons, Levels
 from trdlab.deep.settings import TrainSettings
 from trdlab.deep.trainer import Trainer
-from trdlab.environments import GymEnvironments
+from trdlab.environments import GymEnvironments, NotReproducible
 from trdlab.errors import InputError
 from trdlab.policies import Memoryless
 from trdlab.policies.teacher import Teacher
@@ -197,6 +197,26 @@ def test_it_goes_on_to_the_bit_wherever_it_was_saved(clock):
         while run.agent_steps < 60:
             run.step()
     assert flat(second.state_dict()) == flat(whole.state_dict())
+
+
+class Wayward(GymEnvironments):
+    """Cannot be put back to where it was."""
+
+    def load_state_dict(self, state: Any) -> Any:
+        raise NotReproducible("It does something else.", "Begin anew.")
+
+
+def test_where_episodes_cannot_be_restored_the_teacher_begins_new_ones_too():
+    policy, told = Counting(), settings()
+    first = trainer(Counting())
+    for _ in range(10):
+        first.step()
+    run = Trainer(told, Wayward("CartPole-v1", 2, seed=1), (Teacher(policy), USUAL))
+    assert run.load_state_dict(first.state_dict()) is not None
+    run.step()
+    assert policy.asked[0][1] is None
+    assert policy.asked[0][2] == [True, True]
+    assert run.lessons.teacher_steps == 22
 
 
 def test_what_any_policy_remembers_can_be_kept():

@@ -351,7 +351,7 @@ def options(lines: dict[str, Any]) -> list[str]:
 
 
 def test_the_command_tells_whom_it_learns_from_and_how_far_it_has_come(named, tmp_path, capsys):
-    words = ["train", "gym", "CartPole-v1", "--teacher", named("pole"), *options(FEW | ENOUGH)]
+    words = ["train", "gym", "CartPole-v1", "--teacher", named("pole"), *options(FEW)]
     with pytest.raises(SystemExit) as end:
         main([*words, "--out", str(tmp_path / "run")])
     out, err = capsys.readouterr()
@@ -359,8 +359,8 @@ def test_the_command_tells_whom_it_learns_from_and_how_far_it_has_come(named, tm
     assert re.search(r"Teacher: agents\.py:pole reaches [\d.]+, random actions 2[\d.]+\. A policy "
                      r"head learns what it does\.", err)  # fmt: skip
     assert re.search(r"Of the way from random actions \(2[\d.]+\) to its teacher \([\d.]+\) it has "
-                     r"come \d+ %\.", err)  # fmt: skip
-    assert "10 episodes, by its policy head, seed 1000" in out
+                     r"come -?\d+ %\.", err)  # fmt: skip
+    assert "4 episodes, by its policy head, seed 1000" in out
 
 
 def test_a_dry_run_times_all_phases_and_writes_nothing(named, tmp_path, capsys, monkeypatch):

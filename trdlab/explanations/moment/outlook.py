@@ -109,18 +109,15 @@ def outcomes(choice: Choice) -> Iterator[Found]:
     The chance that an event comes at all is that of the only component that can be told, or at most
     all chances together, if that is little. A group of steps counts once.
     """
-    for fields, (row, *_), (total, *_) in _sums(choice):
-        about = fields | {"action": choice.action, "total": total}
-        if "unit" in fields:
+    for about, row, _ in _sums(choice):
+        peak, total = int(row.argmax()), about["total"]
+        if "unit" in about:
             yield "adds-up", about
         elif len(row) == 1 or total <= DOUBT:
             yield "chance-of", about | {"chance": total}
-        elif row.max() >= _PEAK * np.delete(row, row.argmax()).mean():
-            peak, count = int(row.argmax()), fields["last_step"] + 1
-            yield (
-                "likeliest",
-                about | {"component": peak, "chance": float(row[peak]), "count": count},
-            )
+        elif row[peak] >= _PEAK * np.delete(row, peak).mean():
+            steps = {"component": peak, "chance": float(row[peak]), "count": about["last_step"] + 1}
+            yield "likeliest", about | steps
         else:
             yield "comes-in" if float(said(total, 2)) >= 1.0 else "comes-in-less", about
 
@@ -143,30 +140,29 @@ def outcomes(choice: Choice) -> Iterator[Found]:
 )
 def differences(choice: Choice) -> Iterator[Found]:
     """What comes otherwise with the foil, and by so much that it is no noise."""
-    for fields, (row, *_), (total, *others) in _sums(choice):
-        least, is_event = SHARE * max(map(abs, (total, *others))), "unit" not in fields
-        chancy = "chances-differ" if len(row) == 1 else "comes-otherwise"
-        about = fields | {"action": choice.action, "foil": choice.foil, "total": total}
+    for about, row, others in _sums(choice):
+        kind = "chances-differ" if len(row) == 1 else "comes-otherwise"
+        kind, least = ("adds-up-otherwise", 0.0) if "unit" in about else (kind, DOUBT)
         for other in others:
-            if abs(total - other) > max(DOUBT * is_event, least):
-                yield chancy if is_event else "adds-up-otherwise", about | {"other": other}
+            size = max(abs(about["total"]), abs(other))
+            if abs(about["total"] - other) > max(least, SHARE * size):
+                yield kind, about | {"foil": choice.foil, "other": other}
 
 
 def _sums(choice: Choice) -> Iterator[tuple[Fields, FloatArray, list[float]]]:
-    """Yields each event and amount that can be told, `[1 or 2, K]` of it, and the sum of each row.
+    """Yields what can be told of each event and amount, its components, and the foil's sum if any.
 
-    Amounts have a unit, and are discounted only with w > 1.
+    Amounts have a unit: they are discounted, but with w = 1 not.
     """
-    axis = choice.time_axis
-    is_full = axis.width == 1
+    axis, is_full = choice.time_axis, choice.time_axis.width == 1
     full = np.maximum(axis.discounts, LEAST_DISCOUNT) if is_full else np.ones(axis.num_components)
-    for outcome, last_step, rows in _told(choice, "events"):
-        about = {"outcome": outcome, "last_step": last_step, "count": rows.shape[1]}
-        yield about, rows, rows.sum(axis=1).tolist()
-    for outcome, last_step, rows in _told(choice, "amounts"):
-        unit = "" if is_full else " (discounted)"
-        sums = (rows / full[: rows.shape[1]]).sum(axis=1).tolist()
-        yield {"outcome": outcome, "last_step": last_step, "unit": unit}, rows, sums
+    unit: Fields = {"unit": "" if is_full else " (discounted)"}
+    for kind, weights in (("events", np.ones_like(full)), ("amounts", 1.0 / full)):
+        for outcome, last_step, rows in _told(choice, kind):
+            about: Fields = {"count": rows.shape[1]} if kind == "events" else unit
+            total, *others = (rows * weights[: rows.shape[1]]).sum(axis=1).tolist()
+            about = {"action": choice.action, "outcome": outcome, "total": total} | about
+            yield about | {"last_step": last_step}, rows[0], others
 
 
 @CHOICES.rule(

@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mutants
+from by_hand import try_out
 from trdlab.agents import Agent, gridworld_agent, tabular_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explanations import moment_at
-from trdlab.explanations.assessment import Copying, assess, try_out
+from trdlab.explanations.assessment import Copying, assess
 from trdlab.explanations.moment.outcome import TRIALS, Trial, in_brief, sections
 from trdlab.explanations.rules import Claim, check
 from trdlab.policies import Memoryless

@@ -60,7 +60,7 @@ def tell(played: Played) -> Story:
     return Story(
         played=played,
         start=tuple(every(played, *expected)),
-        moments=tuple(sorted([*told, *surprises], key=place)),
+        moments=tuple(sorted([*told, *surprises], key=lambda of: (place(of), of.kind != "drawn"))),
         end=(*calm, *every(played, *ended, *outcome)),
         most=most[0] if most else None,
     )

@@ -107,13 +107,14 @@ def outcomes(choice: Choice) -> Iterator[Found]:
     """When an event is likeliest, or in how many steps it comes; how much an amount adds up to.
 
     The chance that an event comes at all is that of the only component that can be told, or at most
-    all chances together, if that is little. A group of steps counts once.
+    all chances together, if that is little; it is exactly these where the event ends the episode.
+    Of other events a group of steps counts once.
     """
     for about, row, _ in _sums(choice):
         peak, total = int(row.argmax()), about["total"]
         if "unit" in about:
             yield "adds-up", about
-        elif len(row) == 1 or total <= DOUBT:
+        elif len(row) == 1 or _ends(choice, about["outcome"]) or total <= DOUBT:
             yield "chance-of", about | {"chance": total}
         elif row[peak] >= _PEAK * np.delete(row, peak).mean():
             steps = {"component": peak, "chance": float(row[peak]), "count": about["last_step"] + 1}
@@ -141,12 +142,19 @@ def outcomes(choice: Choice) -> Iterator[Found]:
 def differences(choice: Choice) -> Iterator[Found]:
     """What comes otherwise with the foil, and by so much that it is no noise."""
     for about, row, others in _sums(choice):
-        kind = "chances-differ" if len(row) == 1 else "comes-otherwise"
+        is_once = len(row) == 1 or _ends(choice, about["outcome"])
+        kind = "chances-differ" if is_once else "comes-otherwise"
         kind, least = ("adds-up-otherwise", 0.0) if "unit" in about else (kind, DOUBT)
         for other in others:
             size = max(abs(about["total"]), abs(other))
             if abs(about["total"] - other) > max(least, SHARE * size):
                 yield kind, about | {"foil": choice.foil, "other": other}
+
+
+def _ends(choice: Choice, outcome: str) -> bool:
+    """Whether it ends the episode, so that its chances add up to the chance that it comes."""
+    known = choice.moment.outlook
+    return known is not None and outcome in known.endings
 
 
 def _sums(choice: Choice) -> Iterator[tuple[Fields, FloatArray, list[float]]]:
@@ -160,7 +168,8 @@ def _sums(choice: Choice) -> Iterator[tuple[Fields, FloatArray, list[float]]]:
     for kind, weights in (("events", np.ones_like(full)), ("amounts", 1.0 / full)):
         for outcome, last_step, rows in _told(choice, kind):
             about: Fields = {"count": rows.shape[1]} if kind == "events" else unit
-            total, *others = (rows * weights[: rows.shape[1]]).sum(axis=1).tolist()
+            sums = (rows * weights[: rows.shape[1]]).sum(axis=1)  # [1 or 2]
+            total, *others = np.minimum(sums, 1.0 if _ends(choice, outcome) else np.inf).tolist()
             about = {"action": choice.action, "outcome": outcome, "total": total} | about
             yield about | {"last_step": last_step}, rows[0], others
 

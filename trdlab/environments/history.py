@@ -1,7 +1,7 @@
 """What environments have done since they were last seeded: enough to do it again."""
 
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 from zlib import crc32
 
@@ -83,11 +83,24 @@ class Histories:
         """Notes the first frame of an episode, that of `env` in `frames [B, ...]`."""
         self._checksums[env] = crc32(frames[env : env + 1].data, self._checksums[env])
 
-    def record_step(self, env: int, action: int, frames: Frames, rewards: FloatArray) -> None:
-        """Notes an action and what it led to, that of `env` in `frames` and `rewards [B]`."""
-        self._actions[env].append(action)
-        seen = crc32(frames[env : env + 1].data, self._checksums[env])
-        self._checksums[env] = crc32(rewards[env : env + 1].data, seen)
+    def record_step(
+        self, envs: Sequence[int], actions: Sequence[int], frames: Frames, rewards: FloatArray
+    ) -> None:
+        """Notes the actions of some environments, and what they led to.
+
+        Args:
+            envs: which ones.
+            actions: one of each of them.
+            frames: `[B, ...]`, of all.
+            rewards: `[B]`, of all.
+        """
+        if len(envs) < len(rewards):
+            frames, rewards = frames[envs], rewards[envs]
+        seen = np.concatenate([_bytes_of(frames), _bytes_of(rewards)], axis=1)  # [R, bytes]
+        each, told = seen.shape[1], seen.reshape(-1).data  # slices of which cost next to nothing
+        for env, action, begin in zip(envs, actions, range(0, seen.size, each), strict=True):
+            self._actions[env].append(action)
+            self._checksums[env] = crc32(told[begin : begin + each], self._checksums[env])
 
     def state_dict(self) -> dict[str, Any]:
         """Returns the histories as plain settings and small arrays.
@@ -151,6 +164,11 @@ class Histories:
     def _seed_of(self, env: int) -> int:
         words = np.random.SeedSequence([self._seed, env, int(self._seedings[env])])
         return int(words.generate_state(1)[0] >> 1)  # 31 bits: ALE's seeds are signed
+
+
+def _bytes_of(rows: Frames) -> Frames:
+    """Returns what each of some rows `[R, ...]` consists of, as bytes `[R, bytes]`."""
+    return np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
 
 
 def checked_actions(actions: Any, num_envs: int, num_actions: int) -> IntArray:

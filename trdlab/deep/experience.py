@@ -221,28 +221,35 @@ def gather(
             f"There are {steps} steps, and a share of {share} is forced.",
             "Ask for at least 1 step, and a share from 0 to 1.",
         )
-    rng, taken, batch, parts = np.random.default_rng(seed), 0, 0, list[Experience]()
+    rng, taken, due, parts = np.random.default_rng(seed), 0, 1, list[Experience]()
     read = outcomes or Outcomes()
+
+    def watch(more: int, held: int) -> None:
+        nonlocal due
+        if taken + more >= due:  # seldom, and soon
+            due = 2 * (taken + more)
+            _check_memory(held / more, steps)
+        tell(taken + more)
+
     while taken < steps:
-        own = int(np.random.SeedSequence([seed, batch]).generate_state(1)[0] >> 1)
+        own = int(np.random.SeedSequence([seed, len(parts)]).generate_state(1)[0] >> 1)
+        how = {"steps": steps - taken, "tell": watch}
         with closing(_some(make, num_envs, own)) as environments:
             playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
-            parts.append(_played(playing, future, share, pause, rng, read))
-        taken, batch = taken + len(parts[-1].steps), batch + 1
-        if batch == 1:
-            _check_memory(parts[0], taken, steps)
-        tell(taken)
+            parts.append(_played(playing, future, share, pause, rng, read, **how))
+        taken += len(parts[-1].steps)
     read.check_seen()
+    if len(parts) == 1:
+        return parts[0]
     starts = np.repeat(np.cumsum([0, *map(len, parts[:-1])]), [len(part) for part in parts])
     columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in _COLUMNS}
     moved = {name: columns[name] + starts for name in ("until", "last")}
     return replace(parts[0], **columns | moved)
 
 
-def _check_memory(first: Experience, taken: int, steps: int) -> None:
-    """Refuses more steps than fit, as far as the first episodes tell; they are copied once."""
-    free = available_memory()
-    each = 2 * sum(column.nbytes for column in first.columns.values()) / taken
+def _check_memory(held: float, steps: int) -> None:
+    """Refuses more steps than fit, by the bytes that each takes; they are copied once."""
+    free, each = available_memory(), 2 * held
     if free is not None and each * steps > 0.9 * free:
         fits = int(0.9 * free / each)
         raise TrdlabError(
@@ -260,6 +267,57 @@ def _some(make: Make, num_envs: int, seed: int) -> Environments:
         return make(1, seed)
 
 
+class _Log:
+    """What episodes beside each other bring, in the order in which it comes.
+
+    Args:
+        num_envs: B.
+
+    Attributes:
+        episodes: `[B]`, the number of the one that each environment plays.
+        held: in bytes.
+    """
+
+    def __init__(self, num_envs: int) -> None:
+        self.episodes, self.held = np.arange(num_envs), 0
+        self._columns: list[list[NDArray[Any]]] = []
+        self._coins: dict[int, int] = {}
+        self._begun = num_envs
+
+    def add(self, which: IntArray, *columns: NDArray[Any]) -> None:
+        """Adds a row of each of the environments `which [R]`."""
+        rows = (self.episodes[which], *columns)
+        self._columns = self._columns or [[] for _ in rows]
+        for column, added in zip(self._columns, rows, strict=True):
+            column.append(added)
+            self.held += added.nbytes
+
+    def end(self, over: IntArray, coins: IntArray, begun: IntArray) -> None:
+        """Ends the episodes of some environments.
+
+        Args:
+            over: which ones.
+            coins: of each of them, the step at which the next action would have been forced.
+            begun: the environments in which others have begun.
+        """
+        self._coins |= zip(self.episodes[over].tolist(), coins.tolist(), strict=True)
+        self.episodes[begun] = self._begun + np.arange(len(begun))
+        self._begun += len(begun)
+
+    def in_order(self) -> tuple[list[NDArray[Any]], IntArray, IntArray]:
+        """Returns the columns `[M, ...]`, episode by episode, their lengths `[E]` and coins `[E]`.
+
+        The log is empty afterwards: of what fills the memory there are two copies and never three.
+        """
+        episode = np.concatenate(self._columns.pop(0))
+        order, columns = np.argsort(episode, kind="stable"), list[NDArray[Any]]()
+        while self._columns:
+            together = np.concatenate(self._columns.pop(0))
+            columns.append(together[order])
+        coins = np.array([self._coins[number] for number in range(self._begun)])
+        return columns, np.bincount(episode), coins
+
+
 def _played(
     playing: Playing,
     future: Future,
@@ -267,37 +325,41 @@ def _played(
     pause: int,
     rng: np.random.Generator,
     outcomes: Outcomes,
+    *,
+    steps: int,
+    tell: Callable[[int, int], None],
 ) -> Experience:
-    """Plays one episode in each environment to its end."""
+    """Plays until so many steps are taken, or an episode is cut off, and all to their end."""
     count, num_actions = len(playing.running), playing.environments.num_actions
-    log: list[tuple[Any, ...]] = []  # of some episodes a row each
+    log, taken = _Log(count), 0
     free = np.zeros(count, dtype=np.int64)  # [B], from which step on an action may be forced
-    coin = np.zeros(count, dtype=np.int64)  # [B], the step at which the next one would have been
     while playing.running.any():
-        running, seen, turn = playing.running, playing.stack.newest, playing.turn()
-        seen = seen[running]  # a copy: what is seen changes with the step
-        forced = running & (rng.random(count) < share) & (playing.steps >= free)
-        free = np.where(forced, playing.steps + 1 + pause, free)
+        running, ages, turn = playing.running, playing.ages, playing.turn()
+        which = np.flatnonzero(running)
+        seen = playing.stack.newest[which]  # a copy: what is seen changes with the step
+        forced = running & (rng.random(count) < share) & (ages >= free)
+        free = np.where(forced, ages + 1 + pause, free)
         others = any_actions(rng, count, num_actions, playing.allowed)
         actions = np.where(forced, others, turn.own)
-        step = playing.take(actions)
+        taken += len(which)
+        step = playing.take(actions, play_on=taken < steps and len(which) == count)
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
-        which = np.flatnonzero(running)
         read = outcomes.read(actions, step, which)  # [R, Q]
-        paid, done = future.count(step.rewards)[running], (actions[running], forced[running])
-        log.append((which, seen, turn.probabilities, *done, paid, read, ends[running]))
+        paid, done = future.count(step.rewards)[which], (actions[which], forced[which])
+        log.add(which, seen, turn.probabilities, *done, paid, read, ends[which])
         if playing.finished.any():
             over = np.flatnonzero(playing.finished)
-            wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
-            coin[over] = np.maximum(playing.steps, free[over]) + wait
             none, nothing = np.zeros(len(over), dtype=np.bool_), np.zeros(len(over))
             ended = (none.astype(np.int64), none, nothing, np.zeros((len(over), read.shape[1])))
             whole, likely = playing.last_seen()
             newest = whole[:, -1] if playing.stack.size else whole
-            log.append((over, newest, likely, *ended, none))
-    episode, *columns = (np.concatenate(column) for column in zip(*log, strict=True))
-    order, lengths = np.argsort(episode, kind="stable"), np.bincount(episode)
-    columns = [column[order] for column in columns]
+            log.add(over, newest, likely, *ended, none)
+            wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
+            coins = np.maximum(ages[over] + 1, free[over]) + wait
+            log.end(over, coins, over[playing.running[over]])
+            free[over] = 0
+        tell(taken, log.held)
+    columns, lengths, coin = log.in_order()
     last = np.repeat(lengths.cumsum() - 1, lengths)  # [M]
     first = np.repeat(lengths.cumsum() - lengths, lengths)  # [M]
     until = np.append(next_flag(columns[_COLUMNS.index("forced")], FAR)[1:], FAR)

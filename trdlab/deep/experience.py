@@ -336,6 +336,7 @@ def _played(
     while playing.running.any():
         running, ages, turn = playing.running, playing.ages, playing.turn()
         which = np.flatnonzero(running)
+        rows = slice(None) if len(which) == count else which  # views take less time than copies
         seen = playing.stack.newest[which]  # a copy: what is seen changes with the step
         forced = running & (rng.random(count) < share) & (ages >= free)
         free = np.where(forced, ages + 1 + pause, free)
@@ -345,8 +346,8 @@ def _played(
         step = playing.take(actions, play_on=taken < steps and len(which) == count)
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
         read = outcomes.read(actions, step, which)  # [R, Q]
-        paid, done = future.count(step.rewards)[which], (actions[which], forced[which])
-        log.add(which, seen, turn.probabilities, *done, paid, read, ends[which])
+        paid, done = future.count(step.rewards)[rows], (actions[rows], forced[rows])
+        log.add(which, seen, turn.probabilities, *done, paid, read, ends[rows])
         if playing.finished.any():
             over = np.flatnonzero(playing.finished)
             none, nothing = np.zeros(len(over), dtype=np.bool_), np.zeros(len(over))

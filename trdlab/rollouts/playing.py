@@ -200,10 +200,13 @@ class Playing:
         self.steps += 1
         ages, ended = self.ages + self.running, step.ended
         over = ended if self.max_steps is None else ended | (ages == self.max_steps)  # [B]
-        begun = ended & play_on & self.running
-        self.finished, self.running = self.running & over, self.running & ~over | begun
-        self.ages = np.where(begun, 0, ages)
-        self.stack.push(step.frames, np.zeros_like(over))  # where episodes end, their last ones
+        self.finished = self.running & over
+        if play_on:
+            begun = self.running & ended
+            self.running, self.ages = self.running & ~over | begun, np.where(begun, 0, ages)
+        else:
+            self.running, self.ages = self.running & ~over, ages
+        self.stack.push(step.frames)  # where episodes end, their last ones
         self._last = self.stack.observations[self.finished]
         self._last_allowed = _of(step.allowed, self.finished)
         self.stack.begin(step.following, ended)

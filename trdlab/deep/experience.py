@@ -11,6 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.deep.episode_log import EpisodeLog
 from trdlab.deep.memory import available_memory
 from trdlab.environments import Environments, NotParallel
 from trdlab.environments.batches import Make
@@ -190,7 +191,7 @@ def gather(
     steps: int,
     share: float,
     pause: int = 0,
-    num_envs: int = 16,
+    num_envs: int | None = None,
     max_steps: int | None = None,
     seed: int = 0,
     outcomes: Outcomes | None = None,
@@ -205,7 +206,8 @@ def gather(
         steps: how many are taken at least; the last episodes are played to their end.
         share: the chance that an action is forced: any of them, evenly.
         pause: for how many steps none is forced after that.
-        num_envs: how many episodes are played beside each other.
+        num_envs: how many episodes are played beside each other; by default one for every 1,000
+            steps, from 16 to 64.
         max_steps: after which an episode is cut off.
         seed: of everything.
         outcomes: what else is read of each step.
@@ -226,17 +228,19 @@ def gather(
 
     def watch(more: int, held: int) -> None:
         nonlocal due
-        if taken + more >= due:  # seldom, and soon
-            due = 2 * (taken + more)
-            _check_memory(held / more, steps)
+        if not parts and more >= due:  # soon, and then ever less often
+            due = 2 * more
+            _check_memory(held, more, steps)
         tell(taken + more)
 
     while taken < steps:
         own = int(np.random.SeedSequence([seed, len(parts)]).generate_state(1)[0] >> 1)
-        how = {"steps": steps - taken, "tell": watch}
-        with closing(_some(make, num_envs, own)) as environments:
+        with closing(_some(make, num_envs or _beside(steps), own)) as environments:
             playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
-            parts.append(_played(playing, future, share, pause, rng, read, **how))
+            some = _played(
+                playing, future, share, pause, rng, read, steps=steps - taken, tell=watch
+            )
+        parts.append(some)
         taken += len(parts[-1].steps)
     read.check_seen()
     if len(parts) == 1:
@@ -247,16 +251,25 @@ def gather(
     return replace(parts[0], **columns | moved)
 
 
-def _check_memory(held: float, steps: int) -> None:
-    """Refuses more steps than fit, by the bytes that each takes; they are copied once."""
-    free, each = available_memory(), 2 * held
-    if free is not None and each * steps > 0.9 * free:
-        fits = int(0.9 * free / each)
+def _check_memory(held: int, taken: int, steps: int) -> None:
+    """Refuses more steps than fit, by the bytes that those taken hold; they are copied once."""
+    free, each = available_memory(), 2 * held / taken
+    if free is not None and each * steps > 0.9 * (free + held):
+        fits = int(0.9 * (free + held) / each)
         raise TrdlabError(
             f"{steps:,} steps take about {each * steps / 1e9:.2f} GB, and {free / 1e9:.2f} GB is "
             "free.",
             f"Play at most {fits:,}, or free some memory.",
         )
+
+
+def _beside(steps: int) -> int:
+    """Returns how many episodes to play beside each other, for so many steps of all.
+
+    More of them share what a step costs beside the environments, and play more when there is
+    enough: the last episodes are played to their end.
+    """
+    return min(max(16, steps // 1_000), 64)
 
 
 def _some(make: Make, num_envs: int, seed: int) -> Environments:
@@ -265,57 +278,6 @@ def _some(make: Make, num_envs: int, seed: int) -> Environments:
         return make(num_envs, seed)
     except NotParallel:
         return make(1, seed)
-
-
-class _Log:
-    """What episodes beside each other bring, in the order in which it comes.
-
-    Args:
-        num_envs: B.
-
-    Attributes:
-        episodes: `[B]`, the number of the one that each environment plays.
-        held: in bytes.
-    """
-
-    def __init__(self, num_envs: int) -> None:
-        self.episodes, self.held = np.arange(num_envs), 0
-        self._columns: list[list[NDArray[Any]]] = []
-        self._coins: dict[int, int] = {}
-        self._begun = num_envs
-
-    def add(self, which: IntArray, *columns: NDArray[Any]) -> None:
-        """Adds a row of each of the environments `which [R]`."""
-        rows = (self.episodes[which], *columns)
-        self._columns = self._columns or [[] for _ in rows]
-        for column, added in zip(self._columns, rows, strict=True):
-            column.append(added)
-            self.held += added.nbytes
-
-    def end(self, over: IntArray, coins: IntArray, begun: IntArray) -> None:
-        """Ends the episodes of some environments.
-
-        Args:
-            over: which ones.
-            coins: of each of them, the step at which the next action would have been forced.
-            begun: the environments in which others have begun.
-        """
-        self._coins |= zip(self.episodes[over].tolist(), coins.tolist(), strict=True)
-        self.episodes[begun] = self._begun + np.arange(len(begun))
-        self._begun += len(begun)
-
-    def in_order(self) -> tuple[list[NDArray[Any]], IntArray, IntArray]:
-        """Returns the columns `[M, ...]`, episode by episode, their lengths `[E]` and coins `[E]`.
-
-        The log is empty afterwards: of what fills the memory there are two copies and never three.
-        """
-        episode = np.concatenate(self._columns.pop(0))
-        order, columns = np.argsort(episode, kind="stable"), list[NDArray[Any]]()
-        while self._columns:
-            together = np.concatenate(self._columns.pop(0))
-            columns.append(together[order])
-        coins = np.array([self._coins[number] for number in range(self._begun)])
-        return columns, np.bincount(episode), coins
 
 
 def _played(
@@ -331,7 +293,7 @@ def _played(
 ) -> Experience:
     """Plays until so many steps are taken, or an episode is cut off, and all to their end."""
     count, num_actions = len(playing.running), playing.environments.num_actions
-    log, taken = _Log(count), 0
+    log, taken = EpisodeLog(count), 0
     free = np.zeros(count, dtype=np.int64)  # [B], from which step on an action may be forced
     while playing.running.any():
         running, ages, turn = playing.running, playing.ages, playing.turn()

@@ -192,8 +192,8 @@ class Playing:
 
         Args:
             actions: `[B]`.
-            play_on: whether the next episode is played where the environment ends one, and has so
-                begun another. One that is cut off here is always the last of its environment.
+            play_on: whether the next episode is played where the environment has ended one, and so
+                has begun another. Where one is cut off, after `max_steps`, none follows.
         """
         with blamed(f"at step {self.steps + 1}" + " of an episode" * (not play_on)):
             step = self.environments.step(actions, active=self.running)

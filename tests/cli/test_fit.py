@@ -95,6 +95,21 @@ def test_who_acts_is_the_same_when_it_is_found_again(tmp_path):
     )
 
 
+def test_actions_keep_the_names_that_they_were_given(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = ("--action-names", "hoch, runter, links, rechts")
+    words = ("gridworld:ledge", "--N", 2, "--steps", 2_000, "--time", "1s", "--out", "fit")
+    code, _, _ = run(capsys, "fit", *words, *names)
+    assert code == 0
+    assert trdlab.agent("fit").action_names == ("hoch", "runter", "links", "rechts")
+    manifest = json.loads(Path("fit/manifest.json").read_text())
+    told = json.dumps(manifest).replace('"hoch", "runter"', '"down", "up"')
+    told = told.replace('"links", "rechts"', '"left", "right"')
+    Path("fit/manifest.json").write_text(told)
+    with pytest.raises(InputError, match="does not fit the agent"):  # the same in another order
+        trdlab.agent("fit")
+
+
 def test_another_policy_is_another_agent_and_has_not_its_name(tmp_path):
     agent = trdlab.agent("gridworld:ledge", horizon=2)
     stumbling = trdlab.agent(agent, policy=EpsilonGreedy(agent.policy, 0.3))

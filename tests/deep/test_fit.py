@@ -267,7 +267,7 @@ def test_a_fit_that_was_stopped_goes_on_to_the_bit():
 
 def test_without_components_the_value_of_the_policy_is_learned():
     how = FitSettings(learning_rate=0.01, batch_size=512, most_updates=2_000)
-    fit = Fit(played(steps=60_000), gym.spaces.Discrete(4), TimeAxis(0.9, 0), how)
+    fit = Fit(played(steps=120_000), gym.spaces.Discrete(4), TimeAxis(0.9, 0), how)
     while not fit.done:
         fit.learn()
     told = fit.estimator(FUTURE).decompose(np.arange(3)).value

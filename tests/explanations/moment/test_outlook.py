@@ -55,7 +55,7 @@ def test_an_example_by_hand():
         "With a, fuel adds up to 2 in the first 2 steps, on average.",  # 1 + 0.5 / 0.5
         "In the first 2 steps, most of the difference is hazard: on average -0.1 with a and -1 "
         "with b.",
-        "In the first 3 steps, crash comes 0.3 times with a and 0.6 times with b, on average.",
+        "Of the first 3 steps, crash comes in 0.3 with a and in 0.6 with b, on average.",
         "In the first 2 steps, fuel adds up to 2 with a and 4 with b, on average.",
     ]
 
@@ -92,19 +92,34 @@ def test_what_was_learned_is_never_sure():
         ([0.01, 0.01, 0.02], 3, "With a, there is a chance of about 5 % or less of crash in the "
          "first 3 steps."),
         ([0.8, 0.1, 0.1], 1, "With a, there is about an 80 % chance of crash in the first step."),
-        ([0.2, 0.3, 0.25], 3, "With a, crash comes 0.75 times in the first 3 steps, on average."),
+        ([0.2, 0.3, 0.25], 3, "With a, crash comes in less than one of the first 3 steps: 0.75 on "
+         "average."),
+        ([0.7, 0.8, 0.6], 3, "With a, crash comes in 2.1 of the first 3 steps, on average."),
     ],
 )  # fmt: skip
 def test_an_event_is_rare_or_has_a_time_or_has_none(row, reach, says):
     of = known(events={"crash": np.array([row, row])}, reach=REACH | {"crash": reach})
     assert says in sentences(choice(of))
-    assert said(choice(of), "differs") == said(choice(known()), "differs")[1:], "both are alike"
+    assert said(choice(of), "comes-otherwise") == [], "both are alike"
 
 
-def test_groups_of_steps_are_discounted():
-    assert said(choice(known(), width=2), "counted") == [
+def test_groups_of_steps_are_discounted_and_an_event_counts_once_in_each():
+    often = known(events={"crash": np.array([[0.7, 0.8, 0.6], [0.1, 0.1, 0.1]])})
+    assert said(choice(often, width=2), "adds-up") == [
         "With a, fuel adds up to 1.5 (discounted) in the first 4 steps, on average."
     ]
+    assert said(choice(often, width=2), "comes-in") == [
+        "With a, crash comes in 2.1 of the first 3 groups of 2 steps, on average."
+    ]
+
+
+def test_an_event_of_a_single_step_has_another_chance_with_the_foil():
+    near = known(reach=REACH | {"crash": 1})
+    assert said(choice(near), "chances-differ") == [
+        "In the first step, there is about a 10 % chance of crash with a, and about a 60 % chance "
+        "with b."
+    ]
+    assert said(choice(near), "comes-otherwise") == []
 
 
 def test_only_the_largest_parts_are_named():
@@ -186,7 +201,13 @@ def means(claim: Claim, of: Outlook) -> bool:
             return claim.chance == row[claim.component] == row.max()
         case "chance-of":
             return end == 1 or near[claim.outcome][:end].sum() <= 0.05
-        case "counted" | "differs":
+        case "chances-differ":
+            return end == 1 and [claim.total, claim.other] == [
+                of.events[claim.outcome][k, 0] for k in (i, 1 - i)
+            ]
+        case "comes-in" | "comes-in-less" | "comes-otherwise" | "adds-up" | "adds-up-otherwise":
+            if claim.kind in ("comes-in", "comes-in-less"):
+                assert (claim.total < 0.995) == (claim.kind == "comes-in-less")
             full = GAMMA ** np.arange(end) if claim.outcome in of.amounts else np.ones(end)
             totals = [(rows[:end] / full).sum() for rows in
                       (of.events | of.amounts)[claim.outcome][[i, 1 - i]]]  # fmt: skip

@@ -210,7 +210,6 @@ def test_parts_add_up_and_each_is_what_the_exact_table_of_it_says():
         steps=200_000,
         share=0.2,
         num_envs=500,
-        seed=1,
         outcomes=Outcomes(
             {name: f"info.parts.{name}" for name in world.parts}
             | {"fell": lambda step: step.info["parts"]["hazard"] < 0.0}

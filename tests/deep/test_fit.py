@@ -374,6 +374,20 @@ def test_a_fit_reads_pictures():
     np.testing.assert_allclose(last[:, 0, 1], [0.9, 0.0], atol=0.1)
 
 
+def test_it_is_told_how_many_steps_have_been_taken():
+    heard: list[int] = []
+    gather(
+        lambda count, seed: GymEnvironments(Lamps, count, seed=seed),
+        Memoryless(lambda seen: np.tile([0.5, 0.5], (len(seen), 1))),
+        FUTURE,
+        steps=23,
+        share=0.0,
+        num_envs=2,
+        tell=heard.append,
+    )
+    assert heard == list(range(2, 31, 2)), "to the end of episodes of five steps"
+
+
 def test_what_does_not_fit_into_memory_is_refused(monkeypatch):
     monkeypatch.setattr("trdlab.deep.experience.available_memory", lambda: 1_000_000)
     with pytest.raises(TrdlabError, match=r"1,000,000 steps take about .* GB.* Play at most"):

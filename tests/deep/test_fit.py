@@ -207,7 +207,7 @@ def test_parts_add_up_and_each_is_what_the_exact_table_of_it_says():
         ),
         Memoryless(lambda states: policy[states]),
         FUTURE,
-        steps=200_000,
+        steps=300_000,
         share=0.2,
         num_envs=500,
         outcomes=Outcomes(
@@ -215,7 +215,7 @@ def test_parts_add_up_and_each_is_what_the_exact_table_of_it_says():
             | {"fell": lambda step: step.info["parts"]["hazard"] < 0.0}
         ),
     )
-    how = FitSettings(batch_size=512, most_updates=2_000)
+    how = FitSettings(batch_size=512, most_updates=3_000)
     names, parts = (*world.parts, "fell"), tuple(world.parts)
     fit = Fit(of, gym.spaces.Discrete(mdp.num_states), axis, how, names=names, parts=parts)
     while not fit.done:

@@ -285,7 +285,7 @@ def fit(
             steps=steps,
             share=share,
             pause=axis.num_steps if chosen.method == "regression" else 0,
-            num_envs=16 if frozen.world is None else 1_000,  # of a model they are cheap
+            num_envs=None if frozen.world is None else 1_000,  # of a model they are cheap
             max_steps=usual_limit(axis),
             seed=seed,
             outcomes=read,

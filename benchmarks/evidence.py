@@ -20,8 +20,9 @@ import numpy as np
 from trdlab.agents import Agent, gridworld_agent, tabular_agent
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import TrdlabError
-from trdlab.explanations.assessment import assess, moment_at, try_out
+from trdlab.explanations.assessment import assess, moment_at
 from trdlab.explanations.calibration.faults import faults
+from trdlab.explanations.explanation import explain
 from trdlab.explanations.moment import outcome
 
 ENVIRONMENTS = {"FrozenLake-v1": 8, "Taxi-v4": 14, "CliffWalking-v1": 14}
@@ -74,7 +75,8 @@ def tally(agent: Agent, seeds: int) -> Counter[str]:
         faults=bool(faults(report)),
     )
     for seed in range(seeds):
-        trial = try_out(agent, action, foil, seed=seed, report=report)
+        asked = {"action": action, "foil": foil, "seed": seed, "report": report}
+        trial = explain(agent, ("contrast",), **asked).trial
         (section,) = outcome.sections(trial)
         kinds = [claim.kind for claim in section.claims if claim.kind in OUTCOMES]
         told.update(

@@ -24,6 +24,7 @@ from trdlab.deep.experience import Experience, gather
 from trdlab.deep.fit import Fit
 from trdlab.deep.fit_settings import FitSettings, Method
 from trdlab.environments import GymEnvironments
+from trdlab.environments.making import make_environment
 from trdlab.environments.outcomes import Outcomes
 from trdlab.estimator import Future
 from trdlab.gridworld import Gridworld, load_map
@@ -40,7 +41,10 @@ FUTURE = Future("the given policy")
 UNPAID = "unpaid end"
 SHARE = {"mixed": 0.3, "td": 0.3, "regression": 0.1}
 """Of forced actions: what comes after the next one is of no use for regression."""
+FORCED = 0.1
+"""The share of forced actions where costs are measured."""
 Parts = dict[str, np.ndarray]
+Likely = Callable[[np.ndarray], np.ndarray]
 
 
 @cache
@@ -154,28 +158,10 @@ def truth(names: list[str], steps: int, seeds: int) -> None:
 
 def cost(steps: int) -> None:
     """Prints what an update and a step cost, beside the least that they could."""
-    env_id, rng = "CartPole-v1", np.random.default_rng(0)
-    space = gym.make(env_id).observation_space
-
-    def policy(observations: np.ndarray) -> np.ndarray:
-        right = np.where(observations[:, 2] + 0.5 * observations[:, 3] > 0.0, 0.85, 0.15)
-        return np.column_stack([1.0 - right, right])
-
-    def make(count: int, seed: int) -> GymEnvironments:
-        return GymEnvironments(env_id, count, seed=seed)
-
-    began = time.perf_counter()
-    experience = gather(make, Memoryless(policy), FUTURE, steps=steps, share=0.1, seed=0)
-    ours = len(experience.steps) / (time.perf_counter() - began)
-    env = gym.make(env_id)
-    env.reset(seed=0)
-    began = time.perf_counter()
-    for action in rng.integers(2, size=steps):
-        _, _, terminated, truncated, _ = env.step(action)
-        if terminated or truncated:
-            env.reset()
-    alone = steps / (time.perf_counter() - began)
-    print(f"rollouts: {ours:,.0f} steps/s, {100.0 * ours / alone:.0f} % of {env_id} alone")
+    rollouts("LunarLander-v3", lambda seen: np.full((len(seen), 4), 0.25), 64_000)
+    rollouts("CartPole-v1", balancing, 200_000)
+    experience = rolled("CartPole-v1", balancing, steps)
+    space = make_environment("CartPole-v1").observation_space
     for method in METHODS:
         whole = Fit(experience, space, TimeAxis(0.99, 40), FitSettings(method))
         plain = Fit(experience, space, TimeAxis(0.99, 0), FitSettings(method))
@@ -187,6 +173,76 @@ def cost(steps: int) -> None:
             f"of the same network, {own / value:.2f} times N = 0",
             flush=True,
         )
+
+
+def balancing(observations: np.ndarray) -> np.ndarray:
+    """Returns how likely a policy that keeps the pole up for a while takes each action `[B, 2]`."""
+    right = np.where(observations[:, 2] + 0.5 * observations[:, 3] > 0.0, 0.85, 0.15)
+    return np.column_stack([1.0 - right, right])
+
+
+def rolled(env_id: str, policy: Likely, steps: int) -> Experience:
+    """Returns what a policy did in a Gymnasium environment."""
+
+    def make(count: int, seed: int) -> GymEnvironments:
+        return GymEnvironments(env_id, count, seed=seed)
+
+    return gather(make, Memoryless(policy), FUTURE, steps=steps, share=FORCED, seed=0)
+
+
+def rollouts(env_id: str, policy: Likely, steps: int, rounds: int = 5) -> None:
+    """Prints how fast experience is gathered, beside a plain loop over one such environment.
+
+    That loop takes the actions of the same policy, drawn before, and begins anew at every end. The
+    time is that of the processor, so that whatever else runs counts for little.
+    """
+    env, actions = make_environment(env_id), _actions(env_id, policy, 20_000)
+    asked = 0.0
+
+    def timed(observations: np.ndarray) -> np.ndarray:
+        nonlocal asked
+        began = time.process_time()
+        told = policy(observations)
+        asked += time.process_time() - began
+        return told
+
+    found = []
+    for _ in range(rounds):
+        plain, asked = _alone(env, actions), 0.0
+        began = time.process_time()
+        count = len(rolled(env_id, timed, steps).steps)
+        ours = time.process_time() - began
+        found.append((count / ours, plain * count / ours, plain * count / (ours - asked)))
+    speed, whole, without = np.median(found, axis=0)
+    print(
+        f"rollouts of {env_id}: {speed:,.0f} steps/s, {100.0 * whole:.0f} % of the environment "
+        f"alone; {100.0 * without:.0f} % without the policy's own time",
+        flush=True,
+    )
+
+
+def _actions(env_id: str, policy: Likely, steps: int) -> np.ndarray:
+    """Returns the actions of a policy in an environment begun with seed 0, some of them forced."""
+    env, rng, taken = make_environment(env_id), np.random.default_rng(0), []
+    seen, _ = env.reset(seed=0)
+    for _ in range(steps):
+        likely = policy(seen[None])[0]
+        taken.append(rng.choice(len(likely), p=(1.0 - FORCED) * likely + FORCED / len(likely)))
+        seen, _, terminated, truncated, _ = env.step(taken[-1])
+        if terminated or truncated:
+            seen, _ = env.reset()
+    return np.array(taken)
+
+
+def _alone(env: gym.Env, actions: np.ndarray) -> float:
+    """Returns the seconds that a step takes in a plain loop."""
+    env.reset(seed=0)
+    began = time.process_time()
+    for action in actions:
+        _, _, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
+            env.reset()
+    return (time.process_time() - began) / len(actions)
 
 
 def _round(

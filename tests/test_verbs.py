@@ -147,6 +147,47 @@ def test_calibration_and_comparison_are_one_call_each():
     assert not again.difference.value.any()
 
 
+def test_a_report_that_is_there_is_not_made_again():
+    report, told = trdlab.calibrate("gridworld:ledge", episodes=20), []
+    first = trdlab.explain("gridworld:ledge", report=report, watch=told.append)
+    assert first.report is report
+    assert first.choice.moment.calibration is report.calibration
+    assert not told  # nothing was played to judge by
+    agent = trdlab.solve("ledge")
+    own = trdlab.calibrate(agent, episodes=20)
+    assert trdlab.explain(agent, report=own, parts="calibration").report is own
+    assert "agent" not in own.to_dict()
+    for other in ("gridworld:ledge,slip=0.3", "gridworld:drone"):
+        with pytest.raises(InputError, match=r"report is of another agent\. Make it with trdlab"):
+            trdlab.explain(other, report=report)
+    stubborn = trdlab.agent(agent, policy=lambda seen: np.eye(4)[np.zeros(len(seen), int)])
+    with pytest.raises(InputError, match="is of another agent"):
+        trdlab.explain(stubborn, report=own)
+    with pytest.raises(InputError, match=r"a report, and 5 episodes\. Leave out one"):
+        trdlab.explain(agent, report=own, episodes=5)
+
+
+def test_what_was_seen_at_a_step_is_told():
+    found = trdlab.explain("gridworld:drone", step=2, parts="forecast", episodes=0)
+    assert found.observation == found.state
+    env = gym.make("CartPole-v1")
+    acting = trdlab.agent(Falling(), env="CartPole-v1")
+    seen = trdlab.explain(acting, seed=5, step=1, parts="forecast", episodes=0).observation
+    assert seen.shape == env.observation_space.shape
+    again = trdlab.explain(acting, seed=5, step=1, parts="contrast", episodes=0).observation
+    np.testing.assert_array_equal(seen, again)
+    assert trdlab.explain(acting, parts="episode", episodes=0).observation is None
+
+
+def test_actions_are_called_as_people_say():
+    agent = trdlab.agent("gridworld:drone", action_names=["hoch", "runter", "links", "rechts"])
+    found = trdlab.explain(agent, foil="hoch", episodes=0)
+    assert found.choice.action == "runter"
+    assert "Runter gives more immediate rewards" in str(found)
+    with pytest.raises(InputError, match=r"'a', 'a', 'b', 'c'\. Each has a name of its own"):
+        trdlab.agent("gridworld:drone", action_names=["a", "a", "b", "c"])
+
+
 def test_training_is_one_call(tmp_path):
     threads = torch.get_num_threads()
     agent = trdlab.train(

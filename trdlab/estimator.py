@@ -114,6 +114,8 @@ class Outlook:
         survival_reach: how many components in a row, from the first on, survival was surely told
             better than by a constant guess; 0 if that has not been judged.
         reach: the same of each part, event and amount.
+        endings: the names of the events that never came but with the end of an episode, so that
+            they come once at most.
     """
 
     variance: FloatArray
@@ -124,6 +126,7 @@ class Outlook:
     amounts: Mapping[str, FloatArray]
     survival_reach: int = 0
     reach: Mapping[str, int] = field(default_factory=dict)
+    endings: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -21,6 +21,10 @@ class Printable:
     def _repr_html_(self) -> str:
         return str(import_module("trdlab.show.html").html(self))
 
+    def details(self) -> str:
+        """Returns all there is to tell, as text; printing tells what matters most."""
+        return str(import_module("trdlab.show.text").text(self, details=True).plain)
+
     def to_dict(self) -> dict[str, Any]:
         """Returns everything as plain data at full precision, as `--json` prints it."""
         data: dict[str, Any] = import_module("trdlab.show.data").data(self)

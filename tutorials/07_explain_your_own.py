@@ -270,7 +270,7 @@ for name, of in {"hasty": hurried, "fitted": report}.items():
 # **"The other action would have been worse."** Nobody knows what comes of an action that is never
 # taken. So `fit` forces one action in ten (`share=0.1`): any action, evenly. In a state that is
 # seldom visited this is still little. The report judges such actions apart, under *Other actions*;
-# `trdlab.explain(fitted, parts="calibration")` prints all of it. A trial tests a single moment.
+# `print(report.details())` shows all of it. A trial tests a single moment.
 #
 # **"It was right in all test games."** Were these different games? Many simulators begin in the
 # same way each time. An agent that draws nothing then has a single game, or a few:

@@ -32,6 +32,13 @@ class Mark:
         return os.system, ("touch mark",)
 
 
+def test_actions_are_called_as_the_user_says(trdlab, tmp_path):
+    cartpole_ppo(tmp_path / "mine.zip")
+    names = ("--action-names", "west,east")
+    _, out, _ = trdlab("agent", "mine.zip", *CARTPOLE, *names, "--episodes", 1)
+    assert "2 actions (west, east)" in " ".join(out.split())
+
+
 def test_an_archive_is_shown_checked_and_played(trdlab, tmp_path):
     cartpole_ppo(tmp_path / "mine.zip")
     code, out, err = trdlab("agent", "mine.zip", *CARTPOLE, "--episodes", 6, "--seed", 3)

@@ -42,6 +42,17 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(expla
     assert (tmp_path / "explanations" / "drone-2" / "calibration.png").exists()
 
 
+def test_actions_are_called_as_the_user_says(explain):
+    names = ("--action-names", "hoch,runter,links,rechts")
+    _, out, _ = explain("gridworld:drone", "--episodes", 0, "--what", "contrast", *names)
+    assert "Runter gives more immediate rewards" in out
+    code, _, err = explain("gridworld:drone", "--action-names", "hoch,runter")
+    assert (code, err) == (
+        2,
+        "error: There are 2 names for 4 actions: hoch, runter. Give one for each action.\n",
+    )
+
+
 def test_a_notebook_shows_what_the_command_prints(explain, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     _, out, _ = explain("gridworld:drone", "--episodes", 40)

@@ -95,6 +95,21 @@ def test_who_acts_is_the_same_when_it_is_found_again(tmp_path):
     )
 
 
+def test_actions_keep_the_names_that_they_were_given(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = ("--action-names", "hoch, runter, links, rechts")
+    words = ("gridworld:ledge", "--N", 2, "--steps", 2_000, "--time", "1s", "--out", "fit")
+    code, _, _ = run(capsys, "fit", *words, *names)
+    assert code == 0
+    assert trdlab.agent("fit").action_names == ("hoch", "runter", "links", "rechts")
+    manifest = json.loads(Path("fit/manifest.json").read_text())
+    told = json.dumps(manifest).replace('"hoch", "runter"', '"down", "up"')
+    told = told.replace('"links", "rechts"', '"left", "right"')
+    Path("fit/manifest.json").write_text(told)
+    with pytest.raises(InputError, match="does not fit the agent"):  # the same in another order
+        trdlab.agent("fit")
+
+
 def test_another_policy_is_another_agent_and_has_not_its_name(tmp_path):
     agent = trdlab.agent("gridworld:ledge", horizon=2)
     stumbling = trdlab.agent(agent, policy=EpsilonGreedy(agent.policy, 0.3))
@@ -124,8 +139,8 @@ def test_a_fit_that_was_stopped_goes_on_with_the_same_bits(kept: Path, tmp_path,
 
     def later() -> bool:
         nonlocal asked
-        asked += 1
-        return asked > 3  # twice while it plays, then at the second look
+        asked += path.exists()  # which it does when all is played
+        return asked > 1  # at the second look
 
     with pytest.raises(Stopped, match=r"Stopped at \d+ updates\."):
         trdlab.fit("gridworld:ledge", out=path, should_stop=later, **QUICK)  # type: ignore[arg-type]
@@ -159,12 +174,12 @@ def test_a_fit_is_listed_with_runs_and_is_none(kept: Path, capsys):
 
 
 def test_what_was_given_in_python_goes_on_in_python(tmp_path, capsys):
-    asked = iter([False, False, True])  # twice while it plays
+    path = tmp_path / "fit"  # which is made when all is played
     given = {"fell": lambda step: step.terminated}
-    stopped = {"out": tmp_path / "fit", "should_stop": lambda: next(asked), "outcomes": given}
+    stopped = {"out": path, "should_stop": path.exists, "outcomes": given}
     with pytest.raises(Stopped):
         trdlab.fit("gridworld:ledge", **stopped, **QUICK)  # type: ignore[arg-type]
-    code, _, err = run(capsys, "resume", tmp_path / "fit")
+    code, _, err = run(capsys, "resume", path)
     assert code == 2
     assert "The outcomes of" in err
     assert "were given in Python. Go on there: trdlab.fit" in err

@@ -43,6 +43,16 @@ def test_what_is_forecast_depends_on_what_came():
     assert found == ["part", "part", "square", "running"]
 
 
+def test_an_event_that_only_came_with_an_end_is_known_as_one():
+    of = episode([1.0, 2.0, 4.0], [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+    of.ends[2] = True
+    assert kinds(of, "crash", "never", "coin", axis=TimeAxis(0.5, 2))[-3:] == [
+        "ending",
+        "event",
+        "event",
+    ]
+
+
 def test_groups_end_where_the_episode_does():
     of = episode([1.0, 2.0, 4.0], [[1.0, 3.0], [1.0, 0.0], [0.0, 5.0]])
     of.ends[2] = True

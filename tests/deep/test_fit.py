@@ -207,7 +207,7 @@ def test_parts_add_up_and_each_is_what_the_exact_table_of_it_says():
         ),
         Memoryless(lambda states: policy[states]),
         FUTURE,
-        steps=200_000,
+        steps=300_000,
         share=0.2,
         num_envs=500,
         outcomes=Outcomes(
@@ -215,7 +215,7 @@ def test_parts_add_up_and_each_is_what_the_exact_table_of_it_says():
             | {"fell": lambda step: step.info["parts"]["hazard"] < 0.0}
         ),
     )
-    how = FitSettings(batch_size=512, most_updates=2_000)
+    how = FitSettings(batch_size=512, most_updates=3_000)
     names, parts = (*world.parts, "fell"), tuple(world.parts)
     fit = Fit(of, gym.spaces.Discrete(mdp.num_states), axis, how, names=names, parts=parts)
     while not fit.done:
@@ -266,7 +266,7 @@ def test_a_fit_that_was_stopped_goes_on_to_the_bit():
 
 def test_without_components_the_value_of_the_policy_is_learned():
     how = FitSettings(learning_rate=0.01, batch_size=512, most_updates=2_000)
-    fit = Fit(played(steps=60_000), gym.spaces.Discrete(4), TimeAxis(0.9, 0), how)
+    fit = Fit(played(steps=120_000), gym.spaces.Discrete(4), TimeAxis(0.9, 0), how)
     while not fit.done:
         fit.learn()
     told = fit.estimator(FUTURE).decompose(np.arange(3)).value
@@ -372,6 +372,20 @@ def test_a_fit_reads_pictures():
     last = fit.estimator(FUTURE).decompose(of.seen(np.array([0, 4]))).components
     np.testing.assert_allclose(last[..., 0], 1.0, atol=0.05)
     np.testing.assert_allclose(last[:, 0, 1], [0.9, 0.0], atol=0.1)
+
+
+def test_it_is_told_how_many_steps_have_been_taken():
+    heard: list[int] = []
+    gather(
+        lambda count, seed: GymEnvironments(Lamps, count, seed=seed),
+        Memoryless(lambda seen: np.tile([0.5, 0.5], (len(seen), 1))),
+        FUTURE,
+        steps=23,
+        share=0.0,
+        num_envs=2,
+        tell=heard.append,
+    )
+    assert heard == list(range(2, 31, 2)), "to the end of episodes of five steps"
 
 
 def test_what_does_not_fit_into_memory_is_refused(monkeypatch):

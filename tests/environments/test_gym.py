@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import fields
+from zlib import crc32
 
 import gymnasium as gym
 import numpy as np
@@ -119,6 +120,27 @@ def test_restored_to_the_bit_in_the_middle_of_an_episode(env_id, arguments, num_
     assert all(map(same, after, acted(again, 60, seed=1)))
     again.load_state_dict(state)  # and by the same environments, later on
     assert all(map(same, after, acted(again, 60, seed=1)))
+
+
+def test_what_is_saved_tells_all_that_was_seen_since_the_episode_began():
+    """Saved runs of earlier versions are restored, too: their checksums are made in this way."""
+    environments = GymEnvironments("Counter-v0", 3, seed=0)
+    seen = [crc32(frame) for frame in environments.reset()]
+    for row, active in [
+        ([0, 1, 2], None),  # the third one ends
+        ([1, 1, 1], None),
+        ([0, 0, 0], np.array([True, False, True])),
+    ]:
+        step = environments.step(np.array(row), active)
+        for env in range(3) if active is None else (0, 2):
+            seen[env] = crc32(step.rewards[env], crc32(step.frames[env], seen[env]))
+            seen[env] = crc32(step.following[env]) if step.ended[env] else seen[env]
+    state = environments.state_dict()
+    assert state["checksums"].tolist() == seen
+    assert state["lengths"].tolist() == [3, 2, 2]
+    assert state["actions"].tolist() == [0, 1, 0, 1, 1, 1, 0]
+    acted(environments, 1)
+    assert environments.state_dict()["lengths"].tolist() == [0, 3, 3], "the first one has ended"
 
 
 def test_same_seed_same_run_and_every_episode_another():

@@ -11,13 +11,13 @@ import pytest
 import moments
 import trdlab
 import trdlab.envs
-from by_hand import Given
+from by_hand import Given, try_out
 from trdlab.agents import Agent, gridworld_agent
 from trdlab.decomposition import TimeAxis
 from trdlab.environments import Environments, GymEnvironments
 from trdlab.errors import InputError
 from trdlab.estimator import Future
-from trdlab.explanations import assess, check, explain, moment_at, try_out
+from trdlab.explanations import assess, check, explain, moment_at
 from trdlab.explanations.calibration import claims as calibration
 from trdlab.explanations.calibration.faults import faults
 from trdlab.explanations.moment.moment import CHOICES, Choice
@@ -199,7 +199,9 @@ def test_copies_that_share_their_chance_do_not_tell_that_all_can_be_known():
     said = [claim.sentence for part in calibration.sections(report) for claim in part.claims]
     assert not any("all that comes can be known" in sentence for sentence in said)
     assert any("the replays may share their luck" in sentence for sentence in said)
-    tried = try_out(agent, "action 0", "action 1", copies=3).found
+    trial = try_out(agent, "action 0", "action 1", copies=3)
+    assert trial is not None
+    tried = trial.found
     assert tried.same_every_time
     assert tried.observed.low[0] < tried.observed.high[0]  # though all six copies went alike
 

@@ -40,6 +40,15 @@ class Worth:
         return trdlab.RewardDecomposition(components, self.time_axis)
 
 
+class Wild(Worth):
+    """Expects 1 more of every door that is open, and of others anything."""
+
+    def decompose(self, observations):
+        components = super().decompose(observations).components.copy()
+        components[:, :, 0] += np.where(observations[:, :3] == 1, 1.0, 1e6)
+        return trdlab.RewardDecomposition(components, self.time_axis)
+
+
 def doors(count: int, seed: int = 0, **how) -> GymEnvironments:
     return GymEnvironments(lambda: Doors(**how), count, seed=seed)
 
@@ -61,6 +70,14 @@ def test_what_is_allowed_is_told_with_what_is_seen(masks):
         open_then = np.where(step.terminated[:, None], True, step.frames[:, :3] == 1)
         np.testing.assert_array_equal(step.allowed, open_then)
     assert doors(1, masks="nowhere").allowed is None
+
+
+def test_what_is_forbidden_counts_in_no_comparison():
+    wild = replace(agent(), estimator=Wild())  # of what it forbids nobody knows anything
+    found = trdlab.compare(wild, agent(), episodes=4)
+    assert set(found.visits.allowed.sum(axis=1)) == {2, 3}
+    assert found.of_any_action.value.tolist() == [1.0, 0.0]  # of each action it expects 1 more
+    assert not found.visits.components[:, ~found.visits.allowed].any()
 
 
 def test_the_chances_of_what_is_allowed_grow_alike():

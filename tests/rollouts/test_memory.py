@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from trdlab.decomposition import RewardDecomposition, TimeAxis
+from trdlab.deep.experience import gather
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.policies import EpsilonGreedy, Memoryless, ask
@@ -113,3 +114,27 @@ def test_random_actions_are_those_of_a_mixture():
 def test_an_answer_that_is_no_distribution_is_named(answer, message):
     with pytest.raises(InputError, match=message):
         evaluate(Memoryless(lambda observations: answer), ModelEnvironments(WORLD, 2, seed=0))
+
+
+@pytest.mark.parametrize("max_steps", [None, 4])
+def test_a_policy_begins_anew_where_the_next_episode_follows(max_steps):
+    """Gathering plays on where an episode ends, and forgets what was remembered of it."""
+    of = gather(
+        lambda count, seed: ModelEnvironments(WORLD, count, seed=seed),
+        Third(),
+        Future("the third policy"),
+        steps=400,
+        share=0.0,
+        num_envs=8,
+        max_steps=max_steps,
+    )
+    first = np.searchsorted(of.last, of.last[of.steps])
+    assert of.actions[of.steps].tolist() == ((of.steps - first) % 3 == 2).astype(int).tolist()
+    lengths = np.diff(np.unique(of.last), prepend=-1) - 1
+    assert len(lengths) > 50, "far more than 8 episodes"
+    assert 400 <= lengths.sum() == len(of.steps)
+    assert lengths.max() == 4 if max_steps else lengths.max() > 8
+    ended = of.ends[np.unique(of.last) - 1]
+    assert ended[lengths != 4].all()
+    assert ended.all() == (max_steps is None)
+    assert abs((lengths == 1).mean() - 0.25) < 0.1

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from trdlab.agents import Agent
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.estimator import Future
+from trdlab.explanations import CalibrationReport, Trial, explain
 from trdlab.rollouts.episodes import Episode
 from trdlab.tabular import ExactTable, exact
 from trdlab.tabular.uncertainty import spread
@@ -25,6 +27,22 @@ class Given:
 
     def decompose(self, observations: Any) -> RewardDecomposition:
         return RewardDecomposition(self.components[observations], self.time_axis)
+
+
+def try_out(
+    agent: Agent,
+    action: str,
+    foil: str,
+    *,
+    seed: int = 0,
+    copies: int | None = None,
+    report: CalibrationReport | None = None,
+) -> Trial | None:
+    """What comes of two actions at the first step of an episode, each tried from so many copies."""
+    tries = copies or agent.copying.tries
+    known = replace(agent, copying=replace(agent.copying, tries=tries))
+    asked: Any = {"report": report} if report is not None else {"episodes": 0}
+    return explain(known, ("contrast",), seed=seed, action=action, foil=foil, **asked).trial
 
 
 def episode(

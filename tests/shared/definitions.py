@@ -73,7 +73,7 @@ def is_overdue(played: Played, claim: Claim) -> bool:
     """
     episode, i, total = played.episode, claim.component, len(played.episode)
     discounts = episode.time_axis.discounts
-    explicit = episode.predicted[:, :-1] / discounts[:-1]
+    explicit = episode.predicted[:, :-1] / np.maximum(discounts[:-1], 1e-6)
     most = max(explicit.max(), episode.rewards.max())
 
     def is_promised(step: int) -> bool:

@@ -186,7 +186,7 @@ def test_outcomes_are_told_and_drawn_only_where_there_are_some():
     names = [section.name for section in asked.sections]
     assert names[names.index("forecast") + 1] == "outcomes"
     told = [claim.kind for claim in asked.answer]
-    assert sum(kind in ("decides", "differs", "made-of") for kind in told) == 1
+    assert sum(kind in ("decides", "comes-otherwise", "made-of") for kind in told) == 1
     assert all(read(claim.sentence, asked) for claim in asked.answer)
     data = json.loads(json.dumps(asked.to_dict(), allow_nan=False))
     own = data["moment"]["actions"][choice.action]["outlook"]

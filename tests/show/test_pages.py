@@ -95,8 +95,11 @@ def test_a_report_prints_what_matters_most():
         "",
     ]
     assert told[3] == "Over 12 episodes the agent scored 0.833 each, on average."
-    assert 2 <= len(told[3:]) <= 8
-    details = text(nouns()["a report"], details=True).plain
+    assert 2 <= len(told[3:]) <= 9
+    assert told[-1] == "There is more: .details() returns all that there is to tell."
+    details = nouns()["a report"].details()
+    assert details == text(nouns()["a report"], details=True).plain
+    assert ".details()" not in details
     assert "\nWhat this rests on\n  The forecasts were checked on 12 episodes, " in details
     assert "What this rests on" not in "\n".join(told)
 

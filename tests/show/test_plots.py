@@ -140,8 +140,9 @@ def test_whiskers_end_where_no_reward_can_be():
     pays_one = replace(UNJUDGED, calibration=calibrated(AXIS, off_by=OFF_BY, only_reward=1.0))
     ax = plot_action(Figure().subplots(), pays_one, "go")
     np.testing.assert_allclose(whisker_ends(ax), [(0.0, 0.3), (0.2, 0.8)])
-    lake = solved_figure(solved()["FrozenLake"])
-    assert min(low for ax in lake.axes for low, _ in whisker_ends(ax)) == 0.0
+    lake = solved()["FrozenLake"]
+    for drawn in (solved_figure(lake), moment_figure(lake.choice), figure_of(lake.choice.moment)):
+        assert min(low for ax in drawn.axes for low, _ in whisker_ends(ax)) == 0.0
     ledge = solved_figure(solved()["ledge"])  # where there are costs
     assert min(low for ax in ledge.axes for low, _ in whisker_ends(ax)) < 0.0
 

@@ -1,6 +1,6 @@
 """The agent that is explained: an estimator, the policy it describes, and where it acts."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,6 +13,7 @@ from trdlab.agents.places import Origin, look
 from trdlab.decomposition import RewardDecomposition
 from trdlab.environments.batches import Make, in_batches
 from trdlab.environments.interface import Interface
+from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Unfitted
 from trdlab.policies import Likeliest, Policy, acting, ask
 from trdlab.rollouts.branches import Copying
@@ -133,6 +134,37 @@ class Agent:
         """
         told = self.estimator.decompose(observations)
         return told.under(ask(acting(self.policy or self.estimator), observations)[0])
+
+    def named(self, action_names: Sequence[str]) -> "Agent":
+        """Returns the same agent, its actions called as people say.
+
+        Args:
+            action_names: A names.
+
+        Raises:
+            InputError: there are more or fewer, or two are the same.
+        """
+        names = self.interface.named(action_names).action_names
+        if len(set(names)) < len(names) or not all(name.strip() for name in names):
+            raise InputError(
+                f"The action names are {', '.join(map(repr, names))}.",
+                "Each has a name of its own.",
+            )
+        return replace(self, action_names=names)
+
+    def is_same(self, other: "Agent") -> bool:
+        """Returns whether both act alike at the same place, and expect the same.
+
+        Two that were found by one name are the same if they expect the same at the beginning.
+        """
+        if self.estimator is other.estimator:
+            return self.policy is other.policy and self.make is other.make
+        if self.origin is None or self.origin != other.origin:
+            return False
+        with self.begin(seed=0) as recording:
+            seen = recording.playing.stack.observations
+        one, two = (agent.estimator.decompose(seen).components for agent in (self, other))
+        return np.array_equal(one, two)
 
     def action(self, name: str) -> str:
         """Returns the name of an action that is given by its name or its number."""

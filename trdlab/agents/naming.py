@@ -20,7 +20,7 @@ from trdlab.agents.places import (
 )
 from trdlab.environments.arguments import parse_name
 from trdlab.environments.making import check_imported
-from trdlab.environments.naming import is_numbered
+from trdlab.environments.naming import are_own, is_numbered
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
 from trdlab.policies import Policy, acting
@@ -148,9 +148,14 @@ def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent
             f"'{name}' was fitted to an agent without a name.",
             "Give it in Python: trdlab.agent(trdlab.load(folder), env=…, policy=…).",
         )
+    is_own = env is None
     if env is None:
         env, env_arguments = whose.env, whose.env_arguments
     of = find_agent(whose.agent, gamma=whose.solved_for, env=env, env_arguments=env_arguments)
+    names = interface.action_names
+    is_renamed = are_own(names) and {*names} != {*of.action_names}  # and not in another order
+    if is_own and is_renamed and len(names) == len(of.action_names):
+        of = of.named(names)
     interface.check_fits(of.interface, str(env or whose.agent))
     policy = acting(of.policy or of.estimator)
     origin = of.origin and replace(of.origin, name=name, time_axis=None)

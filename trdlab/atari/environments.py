@@ -174,8 +174,8 @@ class AtariEnvironments:
             terminated & acts,
             truncated & acts,
         )
-        for env in np.flatnonzero(acts).tolist():
-            self._histories.record_step(env, int(actions[env]), frames, rewards)
+        acting = np.flatnonzero(acts)
+        self._histories.record_step(acting.tolist(), actions[acting].tolist(), frames, rewards)
         ended, lives = terminated | truncated, info["lives"]
         life_lost = (
             (lives < self._lives) & (lives > 0) & ~ended & acts

@@ -29,6 +29,7 @@ def agent(
         ),
     ] = None,
     env_arguments: common.EnvArguments = None,
+    action_names: common.ActionNames = None,
     episodes: Annotated[int, typer.Option("--episodes", min=1, help="To play.")] = 20,
     greedy: Annotated[
         bool, typer.Option("--greedy", help="Take the likeliest action, where it would draw one.")
@@ -51,6 +52,7 @@ def agent(
     from trdlab.show.training import evaluation_page
 
     found = find_agent(name, env=env, env_arguments=env_arguments or ())
+    found = common.named(found, action_names)
     with EpisodeProgress(common.errors()) as progress:
         result = found.evaluate(
             episodes, greedy=greedy, max_steps=max_steps, seed=seed, watch=progress.on_progress

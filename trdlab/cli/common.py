@@ -14,6 +14,8 @@ from rich.console import Console
 if TYPE_CHECKING:
     from rich.text import Text
 
+    from trdlab.agents.agent import Agent
+
 _GUIDE = "Every word is explained in “How to read the output” (docs/output.md)."
 
 
@@ -55,6 +57,15 @@ EnvArguments = Annotated[
     list[str] | None,
     typer.Option("--env-arg", metavar="KEY=VALUE", help="What to make --env with."),
 ]
+ActionNames = Annotated[
+    str | None,
+    typer.Option(
+        "--action-names",
+        metavar="NAME,NAME",
+        help="What to call the actions.",
+        show_default="as the environment does",
+    ),
+]
 MaxSteps = Annotated[int | None, max_steps_option("1000, or four horizons")]
 EpisodesSeed = Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")]
 Details = Annotated[bool, typer.Option("--details", help="Tell all there is to tell.")]
@@ -91,6 +102,12 @@ def pictures_option(drawn: str) -> Any:
     """Returns the option of a folder to draw into; `drawn` says when there is one by default."""
     default = f"{drawn} a new folder in explanations"
     return typer.Option("--out", metavar="DIR", help="Write pictures there.", show_default=default)
+
+
+def named(found: "Agent", action_names: str | None) -> "Agent":
+    """Returns an agent with its actions called as the option `--action-names` says."""
+    words = None if action_names is None else [word.strip() for word in action_names.split(",")]
+    return found if words is None else found.named(words)
 
 
 def new_console() -> tuple[Console, bool]:

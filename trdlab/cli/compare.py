@@ -19,6 +19,7 @@ def compare(
         typer.Option("--env", help="Where both act.", show_default="where A was made for"),
     ] = None,
     env_arguments: common.EnvArguments = None,
+    action_names: common.ActionNames = None,
     gamma: Annotated[
         float | None,
         typer.Option(
@@ -62,7 +63,7 @@ def compare(
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.explanations.comparison import comparison as two
 
-    agents = find_pair(
+    pair = find_pair(
         (first, second),
         gamma=gamma,
         horizon=horizon,
@@ -70,6 +71,7 @@ def compare(
         env=env,
         env_arguments=env_arguments or (),
     )
+    agents = [common.named(agent, action_names) for agent in pair]
     named = Path("explanations"), f"{agents[0].name}-against-{agents[1].name}"
     is_named = out is None and not as_json
     if is_named:

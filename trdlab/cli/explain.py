@@ -41,6 +41,7 @@ def explain(
     ] = None,
     env: common.Env = None,
     env_arguments: common.EnvArguments = None,
+    action_names: common.ActionNames = None,
     gamma: Annotated[
         float | None,
         typer.Option("--gamma", help="Of an exact table: discount factor.", show_default="0.95"),
@@ -88,6 +89,7 @@ def explain(
         env=env,
         env_arguments=env_arguments or (),
     )
+    found = common.named(found, action_names)
     named = Path("explanations"), found.name
     is_named = out is None and not parts and not as_json
     if is_named:

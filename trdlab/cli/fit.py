@@ -30,6 +30,7 @@ def fit(
     agent: Annotated[str, typer.Argument(metavar="AGENT", help=common.AGENT)],
     env: common.Env = None,
     env_arguments: common.EnvArguments = None,
+    action_names: common.ActionNames = None,
     horizon: Annotated[int, typer.Option("--N", help="Number of explicit components.")] = 40,
     width: Annotated[int, typer.Option("--w", help="Steps in each component.")] = 1,
     gamma: Annotated[
@@ -79,7 +80,7 @@ def fit(
     from trdlab.files import free_name
 
     limit_seconds, parts, outcomes = _seconds(limit), _places(part), _places(outcome)
-    found = _agent(agent, env, env_arguments)
+    found = common.named(_agent(agent, env, env_arguments), action_names)
     out = out or free_name(Path("fits"), f"{found.name}-N{horizon}-w{width}")
     _fit(
         found,

@@ -17,7 +17,7 @@ from trdlab.environments.outcomes import check_parts
 from trdlab.estimator import Outlook
 from trdlab.time_axis import TimeAxis
 
-Kind = Literal["reward", "part", "value", "square", "running", "event", "amount"]
+Kind = Literal["reward", "part", "value", "square", "running", "event", "ending", "amount"]
 FEW = 3
 """So many different rewards besides 0, and the chance of each is told."""
 
@@ -29,7 +29,8 @@ class Channel:
     Args:
         kind: the discounted `reward` of the group, a `part` of it, whether it is one `value`, its
             `square`, whether the episode is still `running` after the group, whether an `event`
-            happened in it, or another `amount`, discounted.
+            happened in it, an `ending` likewise, which never came but with the end of an episode,
+            or another `amount`, discounted.
         name: of an outcome.
         reward: what a `value` is.
     """
@@ -75,13 +76,21 @@ def channels_of(
         beside = beside[1:]  # the chances tell the squares, too
     else:
         paid = (Channel("reward"),)
-    seen = outcomes[rows]  # [T, Q]
+    seen = zip(names, outcomes[rows].T, strict=True)  # [T] each
     others = (
-        Channel("event" if np.isin(column, (0.0, 1.0)).all() else "amount", name)
-        for name, column in zip(names, seen.T, strict=True)
+        Channel(_kind(column, experience.ends[rows]), name)
+        for name, column in seen
         if name not in parts
     )
     return (*paid, *beside, *others)
+
+
+def _kind(outcome: FloatArray, ends: BoolArray) -> Kind:
+    """Returns what an outcome `[T]` is, by what came of it, and by which steps were the last."""
+    if not np.isin(outcome, (0.0, 1.0)).all():
+        return "amount"
+    came = outcome == 1.0
+    return "ending" if came.any() and ends[came].all() else "event"
 
 
 def groups_of(
@@ -112,7 +121,7 @@ def groups_of(
             case "running":
                 after = np.arange(len(experience)) + axis.width
                 column = np.where(experience.next_end >= after, 1.0, 0.0)
-            case "event":
+            case "event" | "ending":
                 column = np.minimum(total(given, 1.0), 1.0)
             case _:
                 column = total(given, axis.gamma)
@@ -177,7 +186,7 @@ def outlook_of(
                 alive = np.minimum.accumulate(chance, axis=-1)
             case "part":
                 parts[channel.name] = whole
-            case "event":
+            case "event" | "ending":
                 events[channel.name] = chance
             case "amount":
                 amounts[channel.name] = whole
@@ -193,6 +202,7 @@ def outlook_of(
         amounts=amounts,
         survival_reach=judged.get(Channel("running"), 0),
         reach={channel.name: own for channel, own in judged.items() if channel.name},
+        endings=tuple(channel.name for channel in channels if channel.kind == "ending"),
     )
 
 

@@ -11,6 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
+from trdlab.deep.episode_log import EpisodeLog
 from trdlab.deep.memory import available_memory
 from trdlab.environments import Environments, NotParallel
 from trdlab.environments.batches import Make
@@ -190,7 +191,7 @@ def gather(
     steps: int,
     share: float,
     pause: int = 0,
-    num_envs: int = 16,
+    num_envs: int | None = None,
     max_steps: int | None = None,
     seed: int = 0,
     outcomes: Outcomes | None = None,
@@ -205,7 +206,8 @@ def gather(
         steps: how many are taken at least; the last episodes are played to their end.
         share: the chance that an action is forced: any of them, evenly.
         pause: for how many steps none is forced after that.
-        num_envs: how many episodes are played beside each other.
+        num_envs: how many episodes are played beside each other; by default one for every 1,000
+            steps, from 16 to 64.
         max_steps: after which an episode is cut off.
         seed: of everything.
         outcomes: what else is read of each step.
@@ -221,35 +223,53 @@ def gather(
             f"There are {steps} steps, and a share of {share} is forced.",
             "Ask for at least 1 step, and a share from 0 to 1.",
         )
-    rng, taken, batch, parts = np.random.default_rng(seed), 0, 0, list[Experience]()
+    rng, taken, due, parts = np.random.default_rng(seed), 0, 1, list[Experience]()
     read = outcomes or Outcomes()
+
+    def watch(more: int, held: int) -> None:
+        nonlocal due
+        if not parts and more >= due:  # soon, and then ever less often
+            due = 2 * more
+            _check_memory(held, more, steps)
+        tell(taken + more)
+
     while taken < steps:
-        own = int(np.random.SeedSequence([seed, batch]).generate_state(1)[0] >> 1)
-        with closing(_some(make, num_envs, own)) as environments:
+        own = int(np.random.SeedSequence([seed, len(parts)]).generate_state(1)[0] >> 1)
+        with closing(_some(make, num_envs or _beside(steps), own)) as environments:
             playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
-            parts.append(_played(playing, future, share, pause, rng, read))
-        taken, batch = taken + len(parts[-1].steps), batch + 1
-        if batch == 1:
-            _check_memory(parts[0], taken, steps)
-        tell(taken)
+            some = _played(
+                playing, future, share, pause, rng, read, steps=steps - taken, tell=watch
+            )
+        parts.append(some)
+        taken += len(parts[-1].steps)
     read.check_seen()
+    if len(parts) == 1:
+        return parts[0]
     starts = np.repeat(np.cumsum([0, *map(len, parts[:-1])]), [len(part) for part in parts])
     columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in _COLUMNS}
     moved = {name: columns[name] + starts for name in ("until", "last")}
     return replace(parts[0], **columns | moved)
 
 
-def _check_memory(first: Experience, taken: int, steps: int) -> None:
-    """Refuses more steps than fit, as far as the first episodes tell; they are copied once."""
-    free = available_memory()
-    each = 2 * sum(column.nbytes for column in first.columns.values()) / taken
-    if free is not None and each * steps > 0.9 * free:
-        fits = int(0.9 * free / each)
+def _check_memory(held: int, taken: int, steps: int) -> None:
+    """Refuses more steps than fit, by the bytes that those taken hold; they are copied once."""
+    free, each = available_memory(), 2 * held / taken
+    if free is not None and each * steps > 0.9 * (free + held):
+        fits = int(0.9 * (free + held) / each)
         raise TrdlabError(
             f"{steps:,} steps take about {each * steps / 1e9:.2f} GB, and {free / 1e9:.2f} GB is "
             "free.",
             f"Play at most {fits:,}, or free some memory.",
         )
+
+
+def _beside(steps: int) -> int:
+    """Returns how many episodes to play beside each other, for so many steps of all.
+
+    More of them share what a step costs beside the environments, and play more when there is
+    enough: the last episodes are played to their end.
+    """
+    return min(max(16, steps // 1_000), 64)
 
 
 def _some(make: Make, num_envs: int, seed: int) -> Environments:
@@ -267,37 +287,42 @@ def _played(
     pause: int,
     rng: np.random.Generator,
     outcomes: Outcomes,
+    *,
+    steps: int,
+    tell: Callable[[int, int], None],
 ) -> Experience:
-    """Plays one episode in each environment to its end."""
+    """Plays until so many steps are taken, or an episode is cut off, and all to their end."""
     count, num_actions = len(playing.running), playing.environments.num_actions
-    log: list[tuple[Any, ...]] = []  # of some episodes a row each
+    log, taken = EpisodeLog(count), 0
     free = np.zeros(count, dtype=np.int64)  # [B], from which step on an action may be forced
-    coin = np.zeros(count, dtype=np.int64)  # [B], the step at which the next one would have been
     while playing.running.any():
-        running, seen, turn = playing.running, playing.stack.newest, playing.turn()
-        seen = seen[running]  # a copy: what is seen changes with the step
-        forced = running & (rng.random(count) < share) & (playing.steps >= free)
-        free = np.where(forced, playing.steps + 1 + pause, free)
+        running, ages, turn = playing.running, playing.ages, playing.turn()
+        which = np.flatnonzero(running)
+        rows = slice(None) if len(which) == count else which  # views take less time than copies
+        seen = playing.stack.newest[which]  # a copy: what is seen changes with the step
+        forced = running & (rng.random(count) < share) & (ages >= free)
+        free = np.where(forced, ages + 1 + pause, free)
         others = any_actions(rng, count, num_actions, playing.allowed)
         actions = np.where(forced, others, turn.own)
-        step = playing.take(actions)
+        taken += len(which)
+        step = playing.take(actions, play_on=taken < steps and len(which) == count)
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
-        which = np.flatnonzero(running)
         read = outcomes.read(actions, step, which)  # [R, Q]
-        paid, done = future.count(step.rewards)[running], (actions[running], forced[running])
-        log.append((which, seen, turn.probabilities, *done, paid, read, ends[running]))
+        paid, done = future.count(step.rewards)[rows], (actions[rows], forced[rows])
+        log.add(which, seen, turn.probabilities, *done, paid, read, ends[rows])
         if playing.finished.any():
             over = np.flatnonzero(playing.finished)
-            wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
-            coin[over] = np.maximum(playing.steps, free[over]) + wait
             none, nothing = np.zeros(len(over), dtype=np.bool_), np.zeros(len(over))
             ended = (none.astype(np.int64), none, nothing, np.zeros((len(over), read.shape[1])))
             whole, likely = playing.last_seen()
             newest = whole[:, -1] if playing.stack.size else whole
-            log.append((over, newest, likely, *ended, none))
-    episode, *columns = (np.concatenate(column) for column in zip(*log, strict=True))
-    order, lengths = np.argsort(episode, kind="stable"), np.bincount(episode)
-    columns = [column[order] for column in columns]
+            log.add(over, newest, likely, *ended, none)
+            wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
+            coins = np.maximum(ages[over] + 1, free[over]) + wait
+            log.end(over, coins, over[playing.running[over]])
+            free[over] = 0
+        tell(taken, log.held)
+    columns, lengths, coin = log.in_order()
     last = np.repeat(lengths.cumsum() - 1, lengths)  # [M]
     first = np.repeat(lengths.cumsum() - lengths, lengths)  # [M]
     until = np.append(next_flag(columns[_COLUMNS.index("forced")], FAR)[1:], FAR)

@@ -83,7 +83,10 @@ class Fit:
         rows = self.num_actions * len(self.channels)
         self.network = build_network(space, rows, axis, seed=self.settings.seed, hidden=hidden)
         self._learned, self._kept = self._split()
-        self.scale = self._scale()
+        middle, self.scale = self._sizes()
+        with torch.no_grad():  # learning begins at the best constant
+            bias = torch.from_numpy(middle / self.scale).flatten()  # [C·(N+1)]
+            self.network.head.bias.copy_(bias.repeat(self.num_actions))
         paid = self._groups[experience.steps]
         ends = np.array([np.minimum(paid.min(axis=0), 0.0), np.maximum(paid.max(axis=0), 0.0)])
         most = np.append(np.ones(axis.horizon), 1.0 / (1.0 - axis.gamma**axis.width))
@@ -249,7 +252,7 @@ class Fit:
             `[count, K]`, `[count, K, C, N+1]` as shares of the scale, and `[count, K, 1, N+1]`.
         """
         size, method = self.settings.batch_size, self.settings.method
-        rows = self._some(self._learned, count * size)
+        rows = self.rng.choice(self._learned, count * size)
         most = 1 if method == "td" else None
         ahead = self.experience.ahead(rows, self.axis, self._groups, most)
         target = ahead.target(self.axis, *self._expected(ahead)) / self.scale.astype(np.float32)
@@ -259,18 +262,6 @@ class Fit:
             counts = np.column_stack([ahead.known(self.axis), own >= ahead.came.shape[-1]])
         whole = (rows, target, counts[:, None].astype(np.float32))
         return tuple(part.reshape(count, size, *part.shape[1:]) for part in whole)  # type: ignore[return-value]
-
-    def _some(self, rows: IntArray, count: int) -> IntArray:
-        """Returns some of these steps, half of them with actions that were forced, if any were.
-
-        Else what is seldom done would be learned last, and learning stop before.
-        """
-        forced = rows[self.experience.forced[rows]]
-        if not forced.size:
-            return np.asarray(self.rng.choice(rows, count))
-        half = count // 2
-        some = np.append(self.rng.choice(forced, half), self.rng.choice(rows, count - half))
-        return np.asarray(self.rng.permutation(some))
 
     def _expected(self, ahead: Ahead) -> tuple[FloatArray, IntArray]:
         """Returns `[U, C, N+1]`, what is expected in rows that follow, and which one follows each.
@@ -301,25 +292,30 @@ class Fit:
         is_kept = np.isin(of.last[of.steps], kept)
         return of.steps[~is_kept], of.steps[is_kept]
 
-    def _scale(self) -> FloatArray:
-        """Returns `[C, N+1]`: the root mean square of what came, and what the residual could be.
+    def _sizes(self) -> tuple[FloatArray, FloatArray]:
+        """Returns the mean of what came and its deviation, `[C, N+1]` each.
 
-        It is no less than a part of the most that ever came: else the few steps before something
-        rare would teach so much at once that all else is forgotten.
+        Of the residual they are what it would be, and its size, if rewards went on as they came. A
+        deviation is no less than a part of the most that ever came: else the few steps before
+        something rare would teach so much at once that all else is forgotten.
         """
+        axis = self.axis
         rows = self.rng.choice(self._learned, min(len(self._learned), 20_000), replace=False)
-        ahead = self.experience.ahead(rows, self.axis, self._groups)
-        known = ahead.known(self.axis)[:, None]  # [K, 1, N]
-        came = ahead.came[..., : self.axis.horizon]  # [K, C, N]
-        size = np.sqrt((came**2 * known).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
-        paid = np.abs(self._groups[rows]).mean(axis=0)  # [C]
-        whole = 1.0 / (1.0 - self.axis.gamma**self.axis.width)
+        ahead = self.experience.ahead(rows, axis, self._groups)
+        known = ahead.known(axis)[:, None]  # [K, 1, N]
+        came = np.where(known, ahead.came[..., : axis.horizon], 0.0)  # [K, C, N]
+        count = np.maximum(known.sum(axis=0), 1)  # [1, N]
+        mean = came.sum(axis=0) / count
+        deviation = np.sqrt((np.where(known, came - mean, 0.0) ** 2).sum(axis=0) / count)  # [C, N]
         length = np.mean(self.experience.last[rows] - rows)  # steps that were still to come
-        groups = min(whole, max(length / self.axis.width, 1.0))
-        scale = np.column_stack([size, self.axis.discounts[-1] * paid * groups])  # [C, N+1]
+        most_groups = 1.0 / (1.0 - axis.gamma**axis.width)
+        groups = min(most_groups, max(length / axis.width, 1.0)) * axis.discounts[-1]
+        paid = self._groups[rows]  # [K, C]
+        middle = np.column_stack([mean, groups * paid.mean(axis=0)])
+        scale = np.column_stack([deviation, groups * np.abs(paid).mean(axis=0)])
         most = np.abs(self._groups[self.experience.steps]).max(axis=0)  # [C]
-        least = np.maximum(_RARE * most[:, None] * self.axis.discounts, 1e-30)
-        return np.asarray(np.maximum(scale, least))
+        least = np.maximum(_RARE * most[:, None] * axis.discounts, 1e-30)  # [C, N+1]
+        return middle, np.asarray(np.maximum(scale, least))
 
     def _syncs(self) -> int:
         """Returns how often the target network is copied until what is expected has settled."""
@@ -334,7 +330,7 @@ class Fit:
 
         What came is `[K, C, N+1]`, as shares of the scale, and known `[K, 1, N+1]`.
         """
-        rows = np.unique(self._some(self._kept, 20_000))
+        rows = np.unique(self.rng.choice(self._kept, 20_000))
         ahead = self.experience.ahead(rows, self.axis, self._groups)
         nothing = np.zeros((1, *self.scale.shape)), np.zeros(len(rows), dtype=np.int64)
         came = ahead.target(self.axis, *nothing) / self.scale

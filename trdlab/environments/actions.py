@@ -78,26 +78,16 @@ class Actions:
     def __len__(self) -> int:
         return len(self.called)
 
-    def allowed(self, env: Any, info: Any, name: str) -> BoolArray | None:
-        """Returns which actions can be taken now `[A]`; None where the environment tells of none.
-
-        It tells by a method `action_masks`, as sb3-contrib asks, or by `info["action_mask"]`: an
-        entry for each choice of each part.
+    def allowed(self, told: Any, name: str) -> BoolArray:
+        """Returns which actions can be taken now `[A]`.
 
         Args:
-            env: the environment.
-            info: what its last reset or step told.
+            told: by the environment (see `told_of`), an entry for each choice of each part.
             name: what it is called.
 
         Raises:
             InputError: what it tells is no mask.
         """
-        if (method := masks_of(env)) is not None:
-            told = method()
-        else:
-            told = info.get("action_mask") if isinstance(info, Mapping) else None
-        if told is None:
-            return None
         mask = np.asarray(told)
         if mask.shape != (sum(self.sizes),) or not np.isin(mask, (0, 1)).all():
             raise InputError(
@@ -114,13 +104,29 @@ def masks_of(env: Any) -> Any:
     return next(filter(callable, found), None)
 
 
+def told_of(masks: Any, info: Any) -> Any:
+    """Returns what an environment tells of what can be done now; None where it tells nothing.
+
+    Args:
+        masks: its method that tells it (see `masks_of`), as sb3-contrib asks; None where it has
+            none, and then `info["action_mask"]` may tell it.
+        info: what its last reset or step told.
+    """
+    if masks is not None:
+        return masks()
+    # a dict is by far the most frequent, and what else is a Mapping takes long to find out
+    return info.get("action_mask") if type(info) is dict or isinstance(info, Mapping) else None
+
+
 def possible(env: Any, action: Any) -> Any:
     """Returns an action, as the environment calls it, or another where it forbids this one."""
-    if masks_of(env) is None:
+    if (masks := masks_of(env)) is None:
+        return action
+    if (told := told_of(masks, None)) is None:
         return action
     actions = Actions.of(env.action_space, "it")
-    allowed = actions.allowed(env, None, "it")
+    allowed = actions.allowed(told, "it")
     number = next(i for i, own in enumerate(actions.called) if np.array_equal(own, action))
-    if allowed is None or allowed[number]:
+    if allowed[number]:
         return action
     return actions.called[int(allowed.argmax())]

@@ -9,6 +9,7 @@ import numpy as np
 
 from trdlab.errors import InputError
 
+_NUMBERS = (int, float)
 _PASS_ON = ("gymnasium.wrappers.", "gymnasium.core", "trdlab.environments.")
 
 
@@ -68,7 +69,7 @@ def outcome_of(env: Any, action: Any, name: str) -> tuple[Any, float, bool, bool
             "Return observation, reward, terminated, truncated, info, as Gymnasium asks since "
             "0.26: 'done' became two.",
         ) from error
-    paid = float(reward) if isinstance(reward, int | float) else _number(reward, name)
+    paid = float(reward) if isinstance(reward, _NUMBERS) else _number(reward, name)
     return observation, paid, bool(terminated), bool(truncated), info
 
 

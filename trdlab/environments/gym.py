@@ -1,6 +1,6 @@
 """Gymnasium environments, stepped one after the other."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any, Self
@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from trdlab.arrays import BoolArray, IntArray
-from trdlab.environments.actions import Actions
+from trdlab.environments.actions import Actions, masks_of, told_of
 from trdlab.environments.answers import beginning_of, outcome_of
 from trdlab.environments.aside import aside
 from trdlab.environments.chance import generators, kept_luck, own_chance, renew
@@ -84,6 +84,7 @@ class GymEnvironments:
         self.allowed: BoolArray | None = None
         self.shared_chance, self._is_copy = False, False
         self._infos: dict[int, Any] = {}
+        self._masks: list[Any] = [None] * num_envs
         self._proof: Proof | None = None
 
     @aside()
@@ -107,11 +108,10 @@ class GymEnvironments:
                 none should.
         """
         taken = checked_actions(actions, self.num_envs, self.num_actions).tolist()
-        step = self._blank_step()
-        acting = range(self.num_envs) if active is None else np.flatnonzero(active).tolist()
-        for env in acting:
-            self._act(env, taken[env], step)
-        return step
+        if active is None or active.all():
+            return self._act(range(self.num_envs), taken)
+        acting = np.flatnonzero(active).tolist()
+        return self._act(acting, [taken[env] for env in acting])
 
     def state_dict(self) -> dict[str, Any]:
         """Returns the seeds of the running episodes and the actions taken in them.
@@ -129,13 +129,13 @@ class GymEnvironments:
             InputError: the state was saved with other settings, or is torn.
             NotReproducible: an environment does not do again what it did.
         """
-        step = self._blank_step()
+        frames = self._blank_frames()
         for env, (seeding, actions) in enumerate(self._histories.saved(state)):
-            self._begin(env, step.following, seeding)
+            self._begin(env, frames, seeding)
             for action in actions.tolist():
-                self._act(env, action, step)
+                frames[env] = self._act([env], [action]).following[env]
         self._histories.verify(state, self.name)
-        return step.following
+        return frames
 
     @aside()
     def branch(self, which: IntArray, seed: int) -> Self:
@@ -187,6 +187,8 @@ class GymEnvironments:
         self.observation_space = frame_space(self._space, self.name)
         whole = getattr(self.observation_space, "whole", None)
         self._channels_last = whole is None and self.observation_space.shape != self._space.shape
+        as_it_is = whole is None and not self._channels_last
+        self._plain_shape = self._space.shape if as_it_is else None
         grey = is_image(self._space) and len(self._space.shape or ()) == 2
         self.stack = 1 if grey else None
         spec, metadata = getattr(env, "spec", None), getattr(env, "metadata", None)
@@ -222,13 +224,13 @@ class GymEnvironments:
         except InputError as error:
             raise self._not_copyable(f"{fault} {error.cause}") from error
         copies = self._with(envs, seed=0)
-        step = copies._blank_step()
+        frames = copies._blank_frames()
         for twin, env in enumerate(which):
             seed, actions = self._histories.past(env)
             copies._histories.begin(twin)
-            copies._reset(twin, step.following, seed)
+            copies._reset(twin, frames, seed)
             for action in actions.tolist():
-                copies._act(twin, action, step)
+                copies._act([twin], [action])
             if not copies._histories.same(twin, self._histories, env):
                 copies.close()
                 raise self._not_copyable(f"{fault} Played again, it did something else.")
@@ -242,7 +244,7 @@ class GymEnvironments:
         """Returns the same with copies for environments, whose past is not known."""
         other = copy(self)
         other._envs, other.num_envs, other._is_copy = envs, len(envs), True
-        other._infos = {}
+        other._infos, other._masks = {}, [masks_of(env) for env in envs]
         other._histories = Histories({"copied": True}, num_envs=len(envs), seed=seed)
         other.allowed = None
         return other
@@ -261,34 +263,44 @@ class GymEnvironments:
                 "One of the two is wrong.",
             )
         frames[env] = frame
+        self._masks[env] = masks_of(self._envs[env])
         self._allow(env, info)
         self._histories.record_reset(env, frames)
 
-    def _act(self, env: int, action: int, step: Step) -> None:
-        """Takes one environment's action, and fills its row of `step`."""
-        observation, step.rewards[env], terminated, truncated, info = outcome_of(
-            self._envs[env], self._actions.called[action], self.name
-        )
-        self._infos[env] = info
-        self._allow(env, info, terminated)
+    def _act(self, acting: Sequence[int], actions: Sequence[int]) -> Step:
+        """Takes an action in each of some environments; where an episode ends, another begins."""
+        envs, called, infos, masks = self._envs, self._actions.called, self._infos, self._masks
+        name, plain, step = self.name, self._plain_shape, self._blank_step()
+        frames, rewards, ended = step.frames, step.rewards, []
+        # where a step takes microseconds, each name that is looked up in this loop counts
+        for env, action in zip(acting, actions, strict=True):
+            observation, rewards[env], terminated, truncated, info = outcome_of(
+                envs[env], called[action], name
+            )
+            is_plain = type(observation) is np.ndarray and observation.shape == plain
+            frames[env] = observation if is_plain else self._frame(observation)
+            infos[env] = info
+            if masks[env] is not None or self.allowed is not None or info != {}:
+                self._allow(env, info, terminated)
+            if terminated or truncated:
+                ended.append(env)
+                step.terminated[env], step.truncated[env] = terminated, not terminated
+        self._histories.record_step(acting, actions, frames, rewards)
         if step.allowed is not None and self.allowed is not None:
-            step.allowed[env] = self.allowed[env]
-        step.frames[env] = self._frame(observation)
-        step.terminated[env] = terminated
-        step.truncated[env] = truncated and not terminated
-        self._histories.record_step(env, action, step.frames, step.rewards)
-        if terminated or truncated:
+            step.allowed[acting] = self.allowed[acting]
+        step.following[...] = frames
+        for env in ended:
             self._begin(env, step.following)
-        else:
-            step.following[env] = step.frames[env]
+        return step
 
     def _allow(self, env: int, info: Any, is_over: bool = False) -> None:
         """Notes which actions can be taken next; once it is over, that does not matter."""
-        mask = self._actions.allowed(self._envs[env], info, self.name)
-        if mask is None and self.allowed is None:
+        told = told_of(self._masks[env], info)
+        if told is None and self.allowed is None:
             return
         if self.allowed is None:
             self.allowed = np.ones((self.num_envs, self.num_actions), dtype=np.bool_)
+        mask = None if told is None else self._actions.allowed(told, self.name)
         self.allowed[env] = True if mask is None or is_over else mask
         if not self.allowed[env].any():
             raise InputError(f"{self.name} forbids every action.", "Leave at least one.")

@@ -1,7 +1,7 @@
 """What environments have done since they were last seeded: enough to do it again."""
 
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 from zlib import crc32
 
@@ -10,6 +10,8 @@ import numpy as np
 from trdlab.arrays import FloatArray, IntArray
 from trdlab.environments.protocol import Frames, NotReproducible
 from trdlab.errors import InputError, TrdlabError
+
+_HELD, _LEAST = 1_000_000, 1_000  # bytes of steps noted together; each counts as so many at least
 
 
 class Histories:
@@ -49,6 +51,11 @@ class Histories:
         self._seedings = np.full(num_envs, -1, dtype=np.int64)  # k
         self._actions = [array("i") for _ in range(num_envs)]
         self._checksums = [0] * num_envs
+        # steps are noted some at a time, which takes a third of the time: those not yet, and from
+        # which of them on they belong to the present of each environment
+        self._open: list[tuple[Sequence[int], Frames, FloatArray]] = []
+        self._acting: Sequence[int] = ()
+        self._since = [0] * num_envs
 
     def begin(self, env: int, seeding: int | None = None) -> int:
         """Forgets the past of an environment, and returns the seed to reset it with.
@@ -59,7 +66,7 @@ class Histories:
         """
         self._seedings[env] = self._seedings[env] + 1 if seeding is None else seeding
         self._actions[env] = array("i")
-        self._checksums[env] = 0
+        self._checksums[env], self._since[env] = 0, len(self._open)
         return self._seed_of(env)
 
     def past(self, env: int) -> tuple[int, IntArray]:
@@ -69,25 +76,56 @@ class Histories:
             TrdlabError: no episode has begun.
         """
         self._check_begun(env)
+        self._settle()
         return self._seed_of(env), np.array(self._actions[env], dtype=np.int64)
 
     def same(self, env: int, other: "Histories", other_env: int) -> bool:
         """Returns whether two environments have shown the same since they were last seeded."""
+        self._settle()
+        other._settle()
         return self._checksums[env] == other._checksums[other_env]
 
     def is_due(self, env: int) -> bool:
         """Whether the next reset of an environment should be a seeded one."""
+        self._settle()
         return len(self._actions[env]) >= self._reseed_after
 
     def record_reset(self, env: int, frames: Frames) -> None:
         """Notes the first frame of an episode, that of `env` in `frames [B, ...]`."""
+        if self._since[env] < len(self._open):
+            self._settle()
         self._checksums[env] = crc32(frames[env : env + 1].data, self._checksums[env])
 
-    def record_step(self, env: int, action: int, frames: Frames, rewards: FloatArray) -> None:
-        """Notes an action and what it led to, that of `env` in `frames` and `rewards [B]`."""
-        self._actions[env].append(action)
-        seen = crc32(frames[env : env + 1].data, self._checksums[env])
-        self._checksums[env] = crc32(rewards[env : env + 1].data, seen)
+    def record_step(
+        self, envs: Sequence[int], actions: Sequence[int], frames: Frames, rewards: FloatArray
+    ) -> None:
+        """Notes the actions of some environments, and what they led to.
+
+        Args:
+            envs: which ones.
+            actions: one of each of them.
+            frames: `[B, ...]`, of all; nobody may change them afterwards.
+            rewards: `[B]`, of all; likewise.
+        """
+        if len(envs) < len(rewards):
+            frames, rewards = frames[envs], rewards[envs]
+        if envs != self._acting or len(self._open) * max(frames.nbytes, _LEAST) > _HELD:
+            self._settle()
+        self._acting = envs
+        self._open.append((actions, frames, rewards))
+
+    def _settle(self) -> None:
+        """Adds the steps that are open to the pasts of those that took them."""
+        if not self._open:
+            return
+        actions, frames, rewards = (np.stack(of, axis=1) for of in zip(*self._open, strict=True))
+        taken = actions.astype(np.intc)  # [R, T]
+        seen = np.concatenate([_bytes_of(frames), _bytes_of(rewards)], axis=2)  # [R, T, bytes]
+        for row, env in enumerate(self._acting):
+            own = self._since[env]
+            self._actions[env].frombytes(taken[row, own:].tobytes())
+            self._checksums[env] = crc32(seen[row, own:].data, self._checksums[env])
+        self._open, self._since = [], [0] * len(self._since)
 
     def state_dict(self) -> dict[str, Any]:
         """Returns the histories as plain settings and small arrays.
@@ -95,6 +133,7 @@ class Histories:
         Raises:
             TrdlabError: no episode has begun.
         """
+        self._settle()
         for env in range(len(self._actions)):
             self._check_begun(env)
         actions = np.concatenate(self._actions)  # [Σ lengths]
@@ -134,6 +173,7 @@ class Histories:
         Raises:
             NotReproducible: something else was seen on the way.
         """
+        self._settle()
         different = np.flatnonzero(np.asarray(state["checksums"]) != self._checksums)
         self._seedings = np.maximum(self._seedings, state["seedings"])  # no seed comes twice
         if len(different):
@@ -151,6 +191,11 @@ class Histories:
     def _seed_of(self, env: int) -> int:
         words = np.random.SeedSequence([self._seed, env, int(self._seedings[env])])
         return int(words.generate_state(1)[0] >> 1)  # 31 bits: ALE's seeds are signed
+
+
+def _bytes_of(rows: Frames) -> Frames:
+    """Returns what each of some rows `[R, T, ...]` consists of, as bytes `[R, T, bytes]`."""
+    return np.ascontiguousarray(rows).reshape(*rows.shape[:2], -1).view(np.uint8)
 
 
 def checked_actions(actions: Any, num_envs: int, num_actions: int) -> IntArray:

@@ -50,12 +50,21 @@ class FrameStack:
 
     def begin(self, frames: Frames, where: BoolArray) -> None:
         """Begins episodes `where [B]` with these frames `[B, ...]`."""
+        if not where.any():
+            return
         first = frames[where]
         self.frames[where] = first[:, None] if self.padding == "reset" else 0
         self.frames[where, -1] = first
 
-    def push(self, frames: Frames, begins: BoolArray) -> None:
-        """Sees the next frames `[B, ...]`; where an episode `begins [B]`, its first one."""
-        self.frames[:, :-1] = self.frames[:, 1:]
+    def push(self, frames: Frames, begins: BoolArray | None = None) -> None:
+        """Sees the next frames `[B, ...]`; where an episode `begins [B]`, its first one.
+
+        Args:
+            frames: `[B, ...]`.
+            begins: `[B]`; by default no episode does.
+        """
+        if self.frames.shape[1] > 1:
+            self.frames[:, :-1] = self.frames[:, 1:]
         self.frames[:, -1] = frames
-        self.begin(frames, begins)
+        if begins is not None:
+            self.begin(frames, begins)

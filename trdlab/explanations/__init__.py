@@ -7,7 +7,6 @@ from trdlab.lazy import lazily
 if TYPE_CHECKING:
     from trdlab.explanations.assessment import assess as assess
     from trdlab.explanations.assessment import moment_at as moment_at
-    from trdlab.explanations.assessment import try_out as try_out
     from trdlab.explanations.calibration.report import CalibrationReport as CalibrationReport
     from trdlab.explanations.calibration.report import judge as judge
     from trdlab.explanations.comparison.comparison import Comparison as Comparison

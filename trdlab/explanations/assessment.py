@@ -87,7 +87,7 @@ def assess(
         seconds_per_step=agent.seconds_per_step,
         seed=seed,
     )
-    return replace(report, lost=lost)
+    return replace(report, lost=lost, agent=agent)
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,10 @@ def moment_of_play(agent: Agent, playing: Playing) -> Moment:
     Of actions that the environment forbids there nothing is told.
     """
     if agent.world is not None and isinstance(agent.estimator, ExactTable) and not agent.is_away:
-        return exact_moment(agent.world, agent.estimator, int(playing.stack.observations[0]))
+        found = exact_moment(agent.world, agent.estimator, int(playing.stack.observations[0]))
+        called = dict(zip(found.action_names, agent.action_names, strict=True))
+        tied = tuple(called[name] for name in found.tied)
+        return replace(found, action_names=agent.action_names, tied=tied)
     decision, names = playing.decide(), np.array(agent.action_names)
     allowed = slice(None) if playing.allowed is None else playing.allowed[0]  # [A]
     # findings compare sums, and float32 sums differ in order
@@ -195,40 +198,8 @@ def moment_of_play(agent: Agent, playing: Playing) -> Moment:
     )
 
 
-def try_out(
-    agent: Agent,
-    action: str,
-    foil: str,
-    *,
-    seed: int = 0,
-    step: int = 0,
-    copies: int | None = None,
-    report: CalibrationReport | None = None,
-) -> Trial:
-    """Tries two actions at a step of an agent's episode, each from copies of the state.
-
-    Args:
-        agent: whose policy is followed after the first action.
-        action: the name of one action.
-        foil: the name of the other.
-        seed: of the episode.
-        step: of that episode.
-        copies: how often each is tried, by default as the agent's `copying` says.
-        report: on the agent, which knows what rewards can come.
-
-    Raises:
-        InputError: there is no such step or action, or both are the same.
-        NotCopyable: the states of its environment cannot be copied.
-    """
-    with agent.begin(seed=seed) as recording:
-        recording.play_to(step)
-        playing = recording.playing
-        tried = try_in_play(agent, playing, action, foil, seed=seed, copies=copies)
-    return trial_of(agent, tried, report, seed=seed)
-
-
 def try_in_play(
-    agent: Agent, playing: Playing, action: str, foil: str, *, seed: int, copies: int | None = None
+    agent: Agent, playing: Playing, action: str, foil: str, *, seed: int
 ) -> tuple[Branches, Branches]:
     """Returns what follows two actions where the first of an agent's episodes stands.
 
@@ -236,8 +207,7 @@ def try_in_play(
     explicit components, whichever is more.
     """
     steps = max(FOLLOWED, agent.estimator.time_axis.num_steps)
-    tries = agent.copying.tries if copies is None else copies
-    branching = Branching(agent.estimator, agent.policy, tries, steps)
+    branching = Branching(agent.estimator, agent.policy, agent.copying.tries, steps)
     one, other = map(agent.action_names.index, (action, foil))
     return try_actions(branching, playing, one, other, seed=seed)
 

@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
 
 from trdlab.agents.agent import Agent
 from trdlab.environments import NotCopyable
@@ -54,7 +57,8 @@ class Explanation(Printable):
         story: of the whole episode; None where it was not asked for.
         max_steps: after which episodes were cut off, if not before; None for never.
         missing: what is not known, and why, in sentences.
-        state: the number of the state that the moment is in, if its agent has a model.
+        observation: what the agent saw at the moment, as its policy is shown it; None where nothing
+            was asked that speaks of a moment.
     """
 
     agent: Agent
@@ -67,12 +71,18 @@ class Explanation(Printable):
     story: Story | None = None
     max_steps: int | None = None
     missing: tuple[str, ...] = ()
-    state: int | None = None
+    observation: NDArray[Any] | None = None
 
     @property
     def time_axis(self) -> TimeAxis:
         """What the components mean."""
         return self.agent.estimator.time_axis
+
+    @property
+    def state(self) -> int | None:
+        """The number of the state that the moment is in, if its agent has a model."""
+        seen = None if self.agent.world is None else self.observation
+        return None if seen is None else int(seen)
 
     @cached_property
     def answer(self) -> tuple[Claim, ...]:
@@ -125,6 +135,7 @@ def explain(
     action: str | None = None,
     foil: str | None = None,
     episodes: int | None = None,
+    report: CalibrationReport | None = None,
     max_steps: int | None = None,
     watch: Watch = unwatched,
 ) -> Explanation:
@@ -139,29 +150,31 @@ def explain(
         foil: of the one to contrast it with, by default the best other one.
         episodes: by how many the forecasts are judged, 0 for not at all; by default 300 of an exact
             table and 50 of another agent.
+        report: how far the forecasts can be trusted, if that is known: then no episodes are played.
         max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
             says, and no sooner than the step that is explained.
         watch: told how far the episodes are, after every step.
 
     Raises:
-        InputError: the episode has no such step, there is no such action, or no episode to judge
-            by where calibration was asked for.
+        InputError: the episode has no such step, there is no such action, no episode to judge by
+            where calibration was asked for, or the report is of another agent.
     """
     wanted = parts or PARTS
     limit = _limit(agent, step, max_steps)
     count = usual_episodes(agent) if episodes is None else episodes
-    if "calibration" in parts and count == 0:
+    if report is not None:
+        _check_report(report, agent, episodes)
+    elif "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
     copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
-    choice, state, tried, story, report = None, None, None, None, None
+    choice, observation, tried, story = None, None, None, None
     missing: list[str] = []
     with agent.begin(seed=seed, max_steps=limit) as recording:
         if {"forecast", "contrast"} & set(wanted):
             recording.play_to(step)
             names = (None if name is None else agent.action(name) for name in (action, foil))
             choice = moment_of_play(agent, recording.playing).choice(*names)
-            if agent.world is not None:
-                state = int(recording.playing.stack.observations[0])
+            observation = np.array(recording.playing.stack.observations[0])
         if "contrast" in parts and choice is not None and len(agent.action_names) < 2:
             raise InputError(
                 "There is no other action to hold it against.", "Ask for `parts=forecast`."
@@ -176,16 +189,25 @@ def explain(
             recording.play()
             (episode,) = recording.episodes()
             story = tell(Played(episode, agent.action_names, agent.seconds_per_step))
-    if count:
+    if count and report is None:
         report = assess(agent, episodes=count, max_steps=limit, copying=copying, watch=watch)
-        missing += [report.lost] * bool(report.lost)
+    missing += [] if report is None or not report.lost else [report.lost]
     if choice is not None and report is not None:
         known = replace(choice.moment, calibration=report.calibration, foils=report.foils)
         choice = replace(choice, moment=known)
     trial = None if tried is None else trial_of(agent, tried, report, seed=seed)
     return Explanation(
-        agent, parts, seed, step, choice, report, trial, story, limit, tuple(missing), state
+        agent, parts, seed, step, choice, report, trial, story, limit, tuple(missing), observation
     )
+
+
+def _check_report(report: CalibrationReport, agent: Agent, episodes: int | None) -> None:
+    """Checks that a report is of an agent, and that nobody asks for another one."""
+    if episodes is not None:
+        raise InputError(f"There is a report, and {episodes} episodes.", "Leave out one of them.")
+    if report.agent is None or not agent.is_same(report.agent):
+        whose = "does not say of whom it is" if report.agent is None else "is of another agent"
+        raise InputError(f"The report {whose}.", "Make it with trdlab.calibrate(agent).")
 
 
 def _limit(agent: Agent, step: int, max_steps: int | None) -> int:

@@ -21,7 +21,8 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
     sure), `worth`, `ties`.
     Time, where the action is the first step: `when` (a component: at once, 3 steps later, after the
     first 4 steps), `whens` (several), `span` (from one to another), `within` (up to a step: in the
-    first 4 steps), `first` (so many: the first 4 steps), `step` (of an episode).
+    first 4 steps), `first` (so many: the first 4 steps), `groups` (so many of w
+    steps: the first 2 groups of 4 steps), `step` (of an episode).
     Names: `action`, `names`, `text`. With `seconds`, times are told in both.
     """
 
@@ -36,6 +37,10 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
 
     def when(component: int) -> str:
         return when_of(axis, component) + _played(axis.start(component), seconds)
+
+    def groups(count: int) -> str:
+        told = f"the first {count:,} groups of {axis.width} steps"
+        return _first(count) if axis.width == 1 else told
 
     def within(last_step: int) -> str:
         return f"in {_first(last_step + 1)}" + _played(last_step + bool(last_step), seconds)
@@ -72,6 +77,7 @@ def forms_of(axis: TimeAxis, seconds: float | None = None) -> dict[str, Form]:
         "span": _of(span),
         "within": _of(within),
         "first": _of(_first),
+        "groups": _of(groups),
         "step": _of(lambda step: f"step {step:,}"),
     }
 

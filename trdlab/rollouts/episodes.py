@@ -34,6 +34,7 @@ class Episode:
         epsilon: the chance of a random action.
         time_limit: the steps after which every such episode is truncated, if that is known.
         states: `[T+1]`, what was observed where that is one number: the state of a finite model.
+        probabilities: `[T, A]`, how likely the policy took each action; None where nobody knows.
         critic: `[T]`, what the policy's own critic says that each state is worth; None where it has
             none.
     """
@@ -49,6 +50,7 @@ class Episode:
     epsilon: float = 0.0
     time_limit: int | None = None
     states: IntArray | None = None
+    probabilities: FloatArray | None = None
     critic: FloatArray | None = None
 
     def __len__(self) -> int:
@@ -153,7 +155,8 @@ class Recording:
         ends = future.ends(step.terminated, step.truncated, step.life_lost)
         told = (step.life_lost, ends, step.terminated, turn.random)
         happened = (turn.actions, future.count(step.rewards), *told, values)
-        seen = zip(decision.decomposition.components, decision.expected, strict=True)
+        told_of = decision.decomposition.components, decision.expected, decision.probabilities
+        seen = zip(*told_of, strict=True)
         for env, expectations in zip(np.flatnonzero(running), seen, strict=True):
             self._logs[env].append((*expectations, *(part[env] for part in happened)))
             if self._states:
@@ -185,9 +188,8 @@ class Recording:
     def _episode(self, env: int, coins: BoolArray, time_limit: int | None) -> Episode:
         """Returns the episode of an environment, of its log and of coins for past its end."""
         columns = [np.array(column) for column in zip(*self._logs[env], strict=True)]
-        components, expected, actions, rewards, life_lost, ends, terminated, random, critic = (
-            columns
-        )
+        components, expected, probabilities, actions, rewards, *columns = columns
+        life_lost, ends, terminated, random, critic = columns
         return Episode(
             decomposition=RewardDecomposition(components, self._estimator.time_axis),
             expected=np.concatenate([expected, self._last[env][None]]).astype(np.float64),
@@ -200,6 +202,7 @@ class Recording:
             epsilon=self._epsilon,
             time_limit=time_limit,
             states=np.array(self._states[env]) if self._states else None,
+            probabilities=probabilities,
             critic=None if self._critic is None else critic,
         )
 

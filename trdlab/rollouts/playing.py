@@ -97,7 +97,7 @@ class Playing:
     Whoever plays goes on while episodes are `running`: asks what is expected (`decide`) or only
     what is done (`turn`), and then takes the step (`take`). The policy is asked once a step. A lone
     episode is the same with the same seeds, whatever it is played for, and what happens in one
-    episode does not depend on when others end.
+    episode does not depend on when others end. Whoever wants more of them plays on where they end.
 
     Args:
         estimator: whose expectations are told; None where nobody asks for them.
@@ -113,6 +113,7 @@ class Playing:
         running: `[B]`, which episodes go on; whoever plays may leave off some.
         finished: `[B]`, which ones the last step has brought to an end.
         steps: how many have been taken.
+        ages: `[B]`, how many of them in the episode that each plays now.
 
     Raises:
         InputError: there is not a single step.
@@ -137,6 +138,7 @@ class Playing:
         self.stack = FrameStack(frames, environments.stack, environments.padding)
         self.running: BoolArray = np.ones(environments.num_envs, dtype=np.bool_)
         self.finished: BoolArray = ~self.running
+        self.ages: IntArray = np.zeros(environments.num_envs, dtype=np.int64)
         self._estimator, self._policy, self._rng = estimator, policy, rng
         self._epsilon, self._chance = epsilon, chance or rng
         self._memory: Any = None
@@ -185,17 +187,29 @@ class Playing:
             self._turn = Turn(likely, own, random, actions)
         return self._turn
 
-    def take(self, actions: IntArray) -> Step:
-        """Takes a step with these actions `[B]`; where an episode has ended they do not count."""
-        with blamed(f"at step {self.steps + 1} of an episode"):
+    def take(self, actions: IntArray, *, play_on: bool = False) -> Step:
+        """Takes a step with these actions `[B]`; where an episode has ended they do not count.
+
+        Args:
+            actions: `[B]`.
+            play_on: whether the next episode is played where the environment has ended one, and so
+                has begun another. Where one is cut off, after `max_steps`, none follows.
+        """
+        with blamed(f"at step {self.steps + 1}" + " of an episode" * (not play_on)):
             step = self.environments.step(actions, active=self.running)
         self.steps += 1
-        over = step.ended | (self.steps == self.max_steps)  # [B]
-        self.finished, self.running = self.running & over, self.running & ~over
-        self.stack.push(step.frames, np.zeros_like(over))  # where episodes end, their last ones
+        ages, ended = self.ages + self.running, step.ended
+        over = ended if self.max_steps is None else ended | (ages == self.max_steps)  # [B]
+        self.finished = self.running & over
+        if play_on:
+            begun = self.running & ended
+            self.running, self.ages = self.running & ~over | begun, np.where(begun, 0, ages)
+        else:
+            self.running, self.ages = self.running & ~over, ages
+        self.stack.push(step.frames)  # where episodes end, their last ones
         self._last = self.stack.observations[self.finished]
         self._last_allowed = _of(step.allowed, self.finished)
-        self.stack.begin(step.following, step.ended)
+        self.stack.begin(step.following, ended)
         self._decision, self._turn = None, None
         return step
 
@@ -237,6 +251,7 @@ class Playing:
         other = copy(self)
         other.environments = self.environments.branch(which, int(rng.integers(2**31)))
         other.max_steps, other.steps, other._rng, other._epsilon = max_steps, 0, rng, 0.0
+        other.ages = np.zeros(len(which), dtype=np.int64)
         other.stack = copy(self.stack)
         other.stack.frames = self.stack.frames[which]
         other.running = np.full(len(which), max_steps > 0)
@@ -255,7 +270,7 @@ class Playing:
         """Returns how likely the policy takes each action `[R, A]`, and lets it remember."""
         memory = rows(self._memory, self.running[self._asked])
         self._asked = np.flatnonzero(self.running)
-        begins = np.full(len(self._asked), self.steps == 0)
+        begins = self.ages[self._asked] == 0
         allowed = _of(self.allowed, self.running)
         likely, self._memory = ask(policy, observations, memory, begins, allowed)
         return likely

@@ -62,8 +62,8 @@ def what_followed(episode: Episode) -> tuple[FloatArray, BoolArray]:
     alive = starts[:, None] + np.arange(axis.num_steps) <= end[:, None]  # [T, N·w]
     later = np.append(returns(episode, axis.gamma), np.zeros(axis.num_steps))[axis.num_steps :]
     residual = np.where(starts + axis.num_steps <= end, later * axis.gamma**axis.num_steps, 0.0)
-    until = next_flag(np.append(episode.random, False), far)[1 : total + 1]  # [T]
-    until = np.where(end < far, until, np.minimum(until, total))
+    random = _next_random(episode)
+    until = np.where(end < far, random, np.minimum(random, total))
     if episode.time_limit is not None:
         until = np.minimum(until, episode.time_limit)
     whole = (end < far) & (episode.epsilon == 0.0)
@@ -130,6 +130,34 @@ def next_flag(flags: BoolArray, nowhere: int) -> IntArray:
     """Returns, for each place, the first flag there or later; `nowhere` where none comes."""
     places = np.where(flags, np.arange(len(flags)), nowhere)
     return np.asarray(np.minimum.accumulate(places[::-1])[::-1])
+
+
+def windows(episode: Episode, *, fair: bool = False) -> tuple[IntArray, IntArray, BoolArray]:
+    """Returns `[K]` thrice: steps, the last of the w from each, and whether an end came by then.
+
+    A step is left out where a truncation cut its w steps short, for a shortened window would
+    misalign every component (errata C3), and where one of them but the first was random.
+
+    Args:
+        episode: of T steps.
+        fair: whether a step is left out also where that would have been so, had no end come.
+            Otherwise, of the last steps only those that ended would count.
+    """
+    width, total, far = episode.time_axis.width, len(episode), np.iinfo(np.int64).max
+    t, random = np.arange(total), _next_random(episode)
+    end = next_flag(episode.ends, far)  # [T]
+    last = np.minimum(end, t + width - 1)
+    usable = (last < total) & (random > last)
+    if fair:
+        limit = far if episode.time_limit is None else episode.time_limit
+        usable &= t + width <= np.minimum(random, limit)
+    return t[usable], last[usable], (end <= last)[usable]
+
+
+def _next_random(episode: Episode) -> IntArray:
+    """Returns `[T]`: the first random action after each step."""
+    nowhere = np.iinfo(np.int64).max
+    return next_flag(np.append(episode.random, False), nowhere)[1 : len(episode) + 1]
 
 
 def returns(

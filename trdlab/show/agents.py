@@ -53,6 +53,7 @@ def _(report: CalibrationReport) -> Document:
         setting=axis_words(report.time_axis),
         answer=tuple(claim.sentence for claim in calibration.in_brief(report)),
         sections=calibration.sections(report),
+        more="There is more: .details() returns all that there is to tell.",
     )
 
 

@@ -30,6 +30,7 @@ class Document(NamedTuple):
         sections: all that there is to tell.
         check: what was checked of the numbers, and whether it is well.
         folded: whether the sections are told only to who asks for details.
+        more: how to ask for them, where the page says so itself.
     """
 
     heading: str
@@ -40,6 +41,7 @@ class Document(NamedTuple):
     sections: tuple[Section, ...] = ()
     check: tuple[str, bool] | None = None
     folded: bool = True
+    more: str = ""
 
 
 @singledispatch

@@ -129,6 +129,8 @@ def _lines(page: Document, width: int, *, details: bool) -> Iterator[Text]:
     else:
         for i, sentence in enumerate(page.answer):
             yield from wrapped(sentence, width, "" if i else "bold")
+        if page.more:
+            yield from wrapped(page.more, width, "dim")
     if page.check is not None:
         said, is_well = page.check
         yield from (Text(), *wrapped("✓ " * is_well + said, width, "green" if is_well else "red"))

@@ -61,6 +61,7 @@ def explain(
     foil: str | int | None = None,
     parts: str | None = None,
     episodes: int | None = None,
+    report: "CalibrationReport | None" = None,
     max_steps: int | None = None,
     watch: "Watch | None" = None,
     **how: Any,
@@ -78,12 +79,14 @@ def explain(
             between; by default what matters most.
         episodes: by how many other episodes it is judged, 0 for not at all; by default 300 of an
             exact table, 50 of another agent.
+        report: of `trdlab.calibrate` on the same agent, in place of such episodes.
         max_steps: after which an episode is cut off; by default as `usual_limit` says.
         watch: told how far the episodes are, after every step.
         how: else, as for `trdlab.agent`.
 
     Raises:
-        InputError: this is no agent, or there is no such step, action or part.
+        InputError: this is no agent, there is no such step, action or part, or the report is of
+            another agent.
     """
     from trdlab.explanations.explanation import explain as explaining
     from trdlab.explanations.explanation import parse_parts
@@ -98,6 +101,7 @@ def explain(
         action=None if action is None else str(action),
         foil=None if foil is None else str(foil),
         episodes=episodes,
+        report=report,
         max_steps=max_steps,
         watch=watch or unwatched,
     )

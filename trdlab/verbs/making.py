@@ -84,13 +84,9 @@ def agent(
         made = agent_of(what, env, words, changed(AXIS, *axis))
     if policy is not None:
         made = replace(made, policy=acting(policy), origin=None)  # its name is not of this one
-    if action_names is not None and len(action_names) != len(made.action_names):
-        raise InputError(
-            f"There are {len(action_names)} names for {len(made.action_names)} actions.",
-            "Give each action one.",
-        )
-    names = made.action_names if action_names is None else tuple(action_names)
-    return replace(made, name=name or made.name, action_names=names)
+    if action_names is not None:
+        made = made.named(action_names)
+    return replace(made, name=name or made.name)
 
 
 def solve(what: Any, gamma: float = 0.95, horizon: int = 4, width: int = 1) -> "Agent":
@@ -291,7 +287,7 @@ def fit(
             steps=steps,
             share=share,
             pause=axis.num_steps if chosen.method == "regression" else 0,
-            num_envs=16 if frozen.world is None else 1_000,  # of a model they are cheap
+            num_envs=None if frozen.world is None else 1_000,  # of a model they are cheap
             max_steps=usual_limit(axis),
             seed=seed,
             outcomes=read,

@@ -45,6 +45,8 @@ WORDS = {
     "mainly": "hardly",
     "half": "all",
     "a reward": "a cost",
+    "drew": "left out",
+    "likeliest": "least likely",
     "rewards": "costs",
 }
 
@@ -117,6 +119,14 @@ def episodes(draw: st.DrawFn) -> Played:
     components = rng.normal(size=(total, 4, axis.num_components)) * size
     components[np.arange(total), episode.actions] = expected[:-1]
     object.__setattr__(episode, "decomposition", RewardDecomposition(components, axis))
+    if draw(st.booleans()):
+        probabilities = rng.dirichlet(np.ones(4), size=total)
+        object.__setattr__(episode, "probabilities", probabilities)
+        # steps change nothing where the law makes of the next ones what was expected: only draws do
+        components[np.arange(total), episode.actions] += (
+            rng.normal(size=(total, 1)) * size * (rng.random((total, 1)) < 0.3)
+        )
+        object.__setattr__(episode, "decomposition", RewardDecomposition(components, axis))
     object.__setattr__(episode, "expected", expected)
     return Played(episode, NAMES, draw(st.sampled_from([None, 0.25, 1 / 15])))
 
@@ -141,7 +151,7 @@ def read(text: str, played: Played) -> list[str]:
 
 def true_elsewhere(played: Played) -> set[str]:
     """Returns what can be said of each single step: another number of a step may lead there."""
-    rows = range(len(played.revision))
+    rows = range(len(sizes(played)))
     claims = [surprise(played, row) for row in rows if sizes(played)[row] > 0.0]
     return set(said((*claims, *foreseen(played))))
 

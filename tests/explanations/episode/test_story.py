@@ -1,12 +1,13 @@
 """What is told of an episode: key moments, rewards foreseen, promises broken."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import trdlab
 from by_hand import episode
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
@@ -124,6 +125,40 @@ def test_key_moments_are_spread_over_the_episode():
     assert np.diff(sorted(rows)).min() >= 200 / 10
     assert sizes(told)[rows].tolist() == sorted(sizes(told)[rows], reverse=True)
     assert len(tell(told).claims) <= 8
+
+
+def test_what_the_agent_drew_itself_is_told_where_a_likelier_action_was_left():
+    axis = TimeAxis(0.5, 1)
+    chances = np.array([[0.75, 0.25], [0.75, 0.25], [1.0, 0.0]])
+    worth = np.array([[[0.0, 4.0], [0.0, 4.0]], [[8.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]]])
+    drawn = replace(
+        episode([0.0, 0.0, 0.0], axis),
+        decomposition=RewardDecomposition(worth, axis),
+        expected=np.array([[0.0, 4.0], [6.0, 0.0], [0.0, 0.0], [0.0, 0.0]]),
+        actions=np.array([1, 1, 0]),
+        probabilities=chances,
+    )
+    story = tell(Played(drawn, ("left", "right")))
+    # step 0: of both actions as much is expected; it led where 6 is, of which half counts: 1 less
+    assert said(story.moments) == [
+        "At step 0, right turned out 1 worse than expected, mainly because what it expects to come "
+        "after step 0 went from 4 to 3.",
+        "At step 1, the agent drew right, with a 25 % chance, instead of left, its likeliest "
+        "action: 6 worse than its draws on average.",
+    ]
+    assert story.most is not None
+    assert story.most.kind == "drawn"
+    forced = replace(drawn, random=np.array([False, True, False, False]))
+    assert "drawn" not in [of.kind for of in tell(Played(forced, ("left", "right"))).moments]
+    likeliest = replace(drawn, probabilities=chances[:, ::-1])
+    assert "drawn" not in [of.kind for of in tell(Played(likeliest, ("left", "right"))).moments]
+
+
+def test_episodes_that_are_played_know_how_likely_each_action_was():
+    world = Gridworld(load_map("drone"))
+    agent = trdlab.agent(world, policy=lambda seen: np.tile([0.7, 0.1, 0.1, 0.1], (len(seen), 1)))
+    (played,) = agent.play(1, seed=0, max_steps=20)
+    np.testing.assert_allclose(played.probabilities, [[0.7, 0.1, 0.1, 0.1]] * len(played))
 
 
 def test_where_nothing_surprises_nothing_is_made_of_it():

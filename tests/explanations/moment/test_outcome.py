@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mutants
+from by_hand import try_out
 from trdlab.agents import Agent, gridworld_agent, tabular_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explanations import moment_at
-from trdlab.explanations.assessment import Copying, assess, try_out
+from trdlab.explanations.assessment import Copying, assess
 from trdlab.explanations.moment.outcome import TRIALS, Trial, in_brief, sections
 from trdlab.explanations.rules import Claim, check
 from trdlab.policies import Memoryless
@@ -27,6 +28,8 @@ WORDS = {
     "too few": "enough",
     "too close": "too far apart",
     "same": "best",
+    "that step alone": "the end",
+    "these steps alone": "the end",
     "but cut off": "and played on",
     "worth": "in debt",
 }
@@ -103,9 +106,9 @@ def test_what_came_on_the_ledge_agrees_with_the_exact_values():
         "500 tries of each are too few to tell whether right is worth more than up; about "
     )
     assert now.startswith("When tried, 2 steps later, right gained 0.6")
-    assert now.endswith("more than up; the forecast, 0.658, fits.")
+    assert now.endswith("more than up in that step alone; the forecast, 0.658, fits.")
     assert later.startswith("When tried, 3 steps later, up gained 0.")
-    assert later.endswith("more than right; the forecast, 0.5, fits.")
+    assert later.endswith("more than right in that step alone; the forecast, 0.5, fits.")
     assert often == "Right and up were each tried 500 times from here."
 
 
@@ -113,7 +116,7 @@ def test_without_chance_it_says_so_and_gives_no_interval():
     trial = try_out(gridworld_agent("drone", AXIS), "down", "up", copies=3)
     assert [claim.sentence for claim in told(trial)] == [
         "As forecast, down was worth 0.266 more than up.",
-        "As forecast, 1 step later, down gained 0.95 more than up.",
+        "As forecast, 1 step later, down gained 0.95 more than up in that step alone.",
         "Down and up were each tried 3 times from here; each gave the same result every time.",
     ]
 
@@ -160,14 +163,16 @@ def test_a_false_promise_is_found_out():
     assert false.sentence.startswith(
         "The forecast was wrong: up was to be 1.34 ahead, but 2 steps later, right gained 0.6"
     )
-    assert false.sentence.endswith(" more.")
+    assert false.sentence.endswith(" more in that step alone.")
 
 
 def test_less_than_was_promised_is_found_out_too():
     agent = changed(gridworld_agent("ledge", AXIS), action=3, component=2, by=2.0)
     trial = try_out(agent, "right", "up", copies=100)
     (claim,) = (claim for claim in told(trial) if claim.kind == "by-another-amount")
-    assert claim.sentence.endswith("more than up, less than the 2.66 that was forecast.")
+    assert claim.sentence.endswith(
+        "more than up in that step alone, less than the 2.66 that was forecast."
+    )
 
 
 def test_foils_are_judged_beside_what_the_agent_does():

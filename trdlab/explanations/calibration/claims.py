@@ -1,6 +1,7 @@
 """What there is to say of a calibration: how the agent does, how far to trust it, what is wrong."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
@@ -296,8 +297,8 @@ def to_dict(report: CalibrationReport) -> dict[str, Any]:
     is infinite, is `null`.
     """
     foils = report.foils
-    data: dict[str, Any] = plain_data(report)
-    del data["future"]
+    data: dict[str, Any] = plain_data(replace(report, agent=None))
+    del data["future"], data["agent"]
     return {
         "schema": SCHEMA,
         **data,

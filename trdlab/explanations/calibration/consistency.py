@@ -9,7 +9,7 @@ from trdlab.arrays import RELATIVE_ZERO, BoolArray, FloatArray, IntArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.rollouts.episodes import Episode
-from trdlab.rollouts.realised import common_axis, next_flag
+from trdlab.rollouts.realised import common_axis, windows
 from trdlab.statistics import Estimate, Estimates, draws, has_enough, percentiles, pooled
 
 NUM_AGES = 6
@@ -67,8 +67,8 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
         InputError: there are no episodes, or of different time axes; there are no components to
             compare (N = 0), or no two steps w apart.
     """
-    axis, pairs = common_axis(episodes), [_pairs(episode) for episode in episodes]
-    ages, _, goes_on = (np.concatenate(of) for of in zip(*pairs, strict=True))
+    axis, pairs = common_axis(episodes), [windows(episode, fair=True) for episode in episodes]
+    ages, _, ended = (np.concatenate(of) for of in zip(*pairs, strict=True))
     if axis.horizon == 0 or not ages.size:
         raise InputError(
             f"There are {ages.size} pairs of steps to compare, N is {axis.horizon}.",
@@ -90,7 +90,7 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
     return Consistency(
         time_axis=axis,
         num_transitions=len(ages),
-        num_ends=int((~goes_on).sum()),
+        num_ends=int(ended.sum()),
         gap=percentiles(gap / np.maximum(count, 1.0), enough),
         discount=estimates[0],
         discount_explains=estimates[1],
@@ -100,35 +100,20 @@ def consistency_of(episodes: Sequence[Episode], *, seed: int = 0) -> Consistency
     )
 
 
-def _pairs(episode: Episode) -> tuple[IntArray, IntArray, BoolArray]:
-    """Returns `[K]` thrice: t, the observation at t+w, or the last one, and whether it goes on.
-
-    Left out are pairs with a random action after the first, and those that reach beyond a
-    truncation (see `what_followed`).
-    """
-    total, width, far = len(episode), episode.time_axis.width, np.iinfo(np.int64).max
-    t = np.arange(total)
-    end = next_flag(episode.ends, far)  # [T]
-    random = next_flag(np.append(episode.random, False), far)[1 : total + 1]
-    goes_on = end >= t + width
-    usable = (~goes_on | (t + width <= total)) & (random >= t + width)
-    if episode.time_limit is not None:
-        usable &= t + width <= episode.time_limit
-    to = np.where(goes_on, t + width, np.minimum(end, total - 1) + 1)
-    return t[usable], to[usable], goes_on[usable]
-
-
 def _sums(
     episode: Episode,
     t: IntArray,
-    to: IntArray,
-    goes_on: BoolArray,
+    last: IntArray,
+    ended: BoolArray,
     edges: FloatArray,
     first: FloatArray,
 ) -> FloatArray:
     """Returns `[5, ages, N]`: of 1, before, and after where it goes on, ends, and is reset."""
-    before, after = episode.predicted[t, 1:].astype(np.float64), _shifted(episode.expected[to])
-    on, over = goes_on[:, None], ~goes_on[:, None]
+    before, after = (
+        episode.predicted[t, 1:].astype(np.float64),
+        _shifted(episode.expected[last + 1]),
+    )
+    on, over = ~ended[:, None], ended[:, None]
     parts = (np.ones_like(before), before, after * on, after * over, first * over)
     age = np.searchsorted(edges, t, side="right")
     of_age = (age == np.arange(len(edges) + 1)[:, None]).astype(np.float64)  # [ages, K]

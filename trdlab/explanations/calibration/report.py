@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trdlab.agents.agent import Agent
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
@@ -101,6 +102,7 @@ class CalibrationReport(Printable):
         seconds_per_step: how long a step takes as people play, if that is known.
         lost: why there is no ceiling and there are no foils though they were asked for, else empty.
         critique: how the policy's own critic compares; None where it has none.
+        agent: whom it judges; None where that is not known.
     """
 
     future: Future
@@ -117,6 +119,7 @@ class CalibrationReport(Printable):
     seconds_per_step: float | None = None
     lost: str = ""
     critique: Critique | None = None
+    agent: Agent | None = None
 
     @property
     def trust(self) -> Trust:

@@ -82,12 +82,12 @@ def how_much(comparison: Comparison) -> Iterator[Found]:
 
 
 @COMPARISONS.rule(
-    "Over all actions in all these states, what they expect differs by {distance:number} on "
-    "average."
+    "Over all actions that can be taken in these states, what they expect differs by "
+    "{distance:number} on average."
 )
 def of_any_action(comparison: Comparison) -> Iterator[Fields]:
     """The sum of |differences| over all components."""
-    apart = np.abs(comparison.visits.of_any_action).sum(axis=-1)
+    apart = comparison.visits.of_any_action.sum(axis=-1)
     if apart.any():
         yield {"distance": float(apart.mean())}
 

@@ -38,7 +38,7 @@ class Comparison(Printable):
         means: `[2, N+1]`, what each expects of what it would do.
         difference: `[N+1]`, the second's mean minus the first's.
         apart: `[N+1]`, the mean absolute difference at a state.
-        of_any_action: `[N+1]`, the same of one and the same action, over all actions.
+        of_any_action: `[N+1]`, the same of one and the same action, over all that are allowed.
         gap: the difference over all components.
         shift: by how many steps later the second expects its rewards (see `centre`).
         agreement: the share of the states at which both would take the same action.
@@ -163,7 +163,7 @@ def compared(
             *visits.expected,
             visits.difference,
             np.abs(visits.difference),
-            np.abs(visits.of_any_action).mean(axis=1),
+            visits.of_any_action,
             (actions[0] == actions[1])[:, None],
         ],
         axis=1,

@@ -27,13 +27,14 @@ class Visits:
 
     Args:
         time_axis: what the components mean.
-        components: `[2, M, A, N+1]`, in discounted reward.
+        components: `[2, M, A, N+1]`, in discounted reward; 0 of an action that is forbidden.
         probabilities: `[2, M, A]`, of each action under the policy of each.
         player: `[M]`, 0 or 1: in whose episode the state is.
         seed: `[M]`, of that episode.
         step: `[M]`, how many steps had been taken in it.
         different: how many different episodes the states are from.
         cut: how many episodes were not played to their end.
+        allowed: `[M, A]`, which actions can be taken; by default all.
     """
 
     time_axis: TimeAxis
@@ -44,6 +45,7 @@ class Visits:
     step: IntArray
     different: int
     cut: int = 0
+    allowed: BoolArray | bool = True
 
     def __len__(self) -> int:
         return len(self.player)
@@ -65,8 +67,10 @@ class Visits:
 
     @cached_property
     def of_any_action(self) -> FloatArray:
-        """`[M, A, N+1]`: second minus first, of the same action."""
-        return self._without_rounding(self.components[1] - self.components[0])
+        """`[M, N+1]`: how far apart the two are of one action, on average over the allowed ones."""
+        apart = np.abs(self._without_rounding(self.components[1] - self.components[0]))
+        allowed = np.broadcast_to(self.allowed, apart.shape[:2])  # [M, A]
+        return np.asarray(apart.sum(axis=1) / allowed.sum(axis=1, keepdims=True))
 
     @cached_property
     def apart(self) -> FloatArray:
@@ -138,15 +142,18 @@ def visit(
     components, probabilities = zip(
         *(_decided(agent, i, found, axis) for i, agent in enumerate(players)), strict=True
     )
+    masks = [seen.allowed for seen in found if seen.allowed is not None]
+    allowed = np.concatenate(masks) if masks else True
     return Visits(
         time_axis=axis,
-        components=np.stack(components),
+        components=np.where(np.asarray(allowed)[..., None], np.stack(components), 0.0),
         probabilities=np.stack(probabilities),
         player=np.array([seen.player for seen in found]),
         seed=np.array([seen.seed for seen in found]),
         step=np.array([seen.step for seen in found]),
         different=len(different),
         cut=cut,
+        allowed=allowed,
     )
 
 
@@ -159,7 +166,7 @@ class _Seen:
     step: int
     observation: NDArray[Any]
     probabilities: tuple[FloatArray | None, ...]  # [1, A] each; None of who can be asked later
-    allowed: BoolArray | None  # [1, A], which actions can be taken; None where all can always be
+    allowed: BoolArray | None  # [1, A], which actions can be taken; None where all can be
 
 
 class _Kept:

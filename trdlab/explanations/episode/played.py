@@ -12,7 +12,7 @@ from trdlab.explanations.rules import Form, Language
 from trdlab.explanations.words import forms_of
 from trdlab.formatting import said
 from trdlab.rollouts.episodes import Episode
-from trdlab.rollouts.realised import next_flag
+from trdlab.rollouts.realised import windows
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +51,11 @@ def revise(episode: Episode) -> Revision:
     With r the discounted reward of the next w steps and n what is expected at t + w, before is the
     prediction p(t) of the action taken, and after is `target(r, γ^w·g, n)`; g = 0 where an end came
     in between, else 1. After − before is zero on average if p(t) is right. So is every single one
-    where there is no chance.
-
-    A step is left out where a truncation cut its w steps short, for a shortened window would
-    misalign every component (errata C3), and where one of them but the first was random.
+    where there is no chance. `windows` says
+    which steps are left out.
     """
-    axis, total, far = episode.time_axis, len(episode), np.iinfo(np.int64).max
-    t, within = np.arange(total), np.arange(axis.width)
-    end = next_flag(episode.ends, far)  # [T]
-    last = np.minimum(end, t + axis.width - 1)
-    random = next_flag(np.append(episode.random, False), far)[1 : total + 1]  # [T], after t
-    steps = np.flatnonzero((last < total) & (random > last))  # [T′]
-    last, ended = last[steps], end[steps] <= last[steps]
-
+    axis, within = episode.time_axis, np.arange(episode.time_axis.width)
+    steps, last, ended = windows(episode)  # [T′] each
     ahead = steps[:, None] + within  # [T′, w]
     padded = np.append(episode.rewards, np.zeros(axis.width - 1))
     rewards = np.where(ahead <= last[:, None], padded[ahead], 0.0)
@@ -95,6 +87,29 @@ class Played:
     def revision(self) -> Revision:
         """What each step changed."""
         return revise(self.episode)
+
+    @cached_property
+    def draws(self) -> FloatArray:
+        """`[T]`: how much more was expected of the action drawn than of the draws on average.
+
+        It is 0 where nothing was drawn: the policy was sure, or a random action came before it.
+        """
+        episode, total = self.episode, len(self.episode)
+        if episode.probabilities is None:
+            return np.zeros(total)
+        worth = (of.sum(axis=1, dtype=np.float64) for of in (episode.predicted, episode.expected))
+        ahead = np.subtract(*(of[:total] for of in worth))
+        is_drawn = (episode.probabilities.max(axis=1) < 1.0) & ~episode.random[:total]
+        return np.where(is_drawn, ahead, 0.0)
+
+    @cached_property
+    def unlikely(self) -> IntArray:
+        """`[D]`: the steps at which a likelier action was not drawn, and that mattered."""
+        likely, steps = self.episode.probabilities, np.flatnonzero(self.draws)
+        if likely is None:
+            return steps
+        taken = likely[steps, self.episode.actions[steps]]
+        return np.asarray(steps[taken < likely[steps].max(axis=1)])
 
     @property
     def scale(self) -> float:

@@ -27,8 +27,8 @@ class Story:
     Args:
         played: what it is about.
         start: what was expected.
-        moments: surprises, the largest reward that was foreseen, and the promise that was broken
-            for longest; by their steps.
+        moments: surprises, draws of the agent itself, the largest reward that was foreseen, and
+            the promise that was broken for longest; by their steps.
         end: how it ended, and what came of what was expected.
         most: the one moment that matters most; None if none matters much.
     """
@@ -60,7 +60,7 @@ def tell(played: Played) -> Story:
     return Story(
         played=played,
         start=tuple(every(played, *expected)),
-        moments=tuple(sorted([*told, *surprises], key=place)),
+        moments=tuple(sorted([*told, *surprises], key=lambda of: (place(of), of.kind != "drawn"))),
         end=(*calm, *every(played, *ended, *outcome)),
         most=most[0] if most else None,
     )
@@ -72,19 +72,23 @@ def place(claim: Claim) -> int:
 
 
 def key_rows(played: Played, count: int, *told: range) -> list[int]:
-    """Returns the rows of the revision that surprise most, spread over the episode; most first.
+    """Returns the turns that surprise most, spread over the episode; most first (see `sizes`).
 
     Of two that are closer than T/(2·count) steps, or than w, the less surprising one is left out,
-    and so is all that is no larger than `SHARE` of `Played.scale`, or at steps that are `told` of.
+    if both are draws or none is. So is all that is no larger than `SHARE` of `Played.scale`, or at
+    steps that are `told` of.
     """
-    found, steps = sizes(played), played.revision.steps
+    found = sizes(played)
+    steps = np.append(played.revision.steps, played.unlikely)
+    is_draw = np.arange(len(found)) >= len(played.revision)
     apart = max(played.episode.time_axis.width, len(played.episode) / (2 * max(count, 1)))
     chosen: list[int] = []
     for row in np.argsort(-found, kind="stable").tolist():
         if len(chosen) >= count or found[row] <= SHARE * played.scale:
             break
         is_new = not any(steps[row] in of for of in told)
-        if is_new and (np.abs(steps[chosen] - steps[row]) >= apart).all():
+        near = np.abs(steps[chosen] - steps[row]) < apart
+        if is_new and not (near & (is_draw[chosen] == is_draw[row])).any():
             chosen.append(row)
     return chosen
 
@@ -117,10 +121,10 @@ def expected(played: Played) -> Iterator[Found]:
     }
 )
 def changed(played: Played) -> Iterator[Found]:
-    found = sizes(played)
-    if found.size and found.max() <= ROUNDING * played.scale:
+    found = np.append(sizes(played), np.abs(played.draws))
+    if len(played.revision) and found.max() <= ROUNDING * played.scale:
         yield "nothing-changed", {}
-    elif found.size:
+    elif len(played.revision):
         yield "little-changed", {"most": float(found.max())}
 
 

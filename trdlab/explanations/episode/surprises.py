@@ -41,24 +41,29 @@ _SAYS = {
         "At {step:step}, {action} gained {gain:number} {up:at} and lost {loss:number} "
         f"{{down:at}}; {_ALIKE}"
     ),
+    "drawn": (
+        "At {step:step}, the agent drew {action}, with {chance:chance}, instead of {likeliest}, "
+        "its likeliest action: {gap:number} {outcome:text} than its draws on average."
+    ),
 }
 
 
 def surprise(played: Played, row: int) -> Claim:
-    """Returns what is to say of the step at a row of the revision, which changed something."""
+    """Returns what is to say of a turn that changed something (see `sizes`)."""
     kind, fields = _turns(played)[row]
     return Claim(EPISODES.rules[kind], played, fields)
 
 
 @lru_cache(maxsize=8)
 def _turns(played: Played) -> tuple[Found, ...]:
-    """Returns `[T′]`, of each step of the revision what kind of turn it was, and its numbers."""
-    return tuple(_turn(played, row) for row in range(len(played.revision)))
+    """Returns `[T′ + D]`, of each turn what kind it was, and its numbers (see `sizes`)."""
+    revised = (_turn(played, row) for row in range(len(played.revision)))
+    return (*revised, *(_draw(played, step) for step in played.unlikely.tolist()))
 
 
 @EPISODES.kinds(_SAYS)
 def turns(played: Played) -> tuple[Found, ...]:
-    """Steps after which something else was expected than before, with the main reason."""
+    """Steps that changed what was expected, with the main reason, and draws that did."""
     return _turns(played)
 
 
@@ -108,6 +113,19 @@ def _shift(about: Fields, before: FloatArray, after: FloatArray, moved: float) -
     return kind, about | {"worth": worth, "origin": (step, origin), "to": (step, to)}
 
 
+def _draw(played: Played, step: int) -> Found:
+    """Returns what was drawn at a step in place of the likeliest action, and what that changed."""
+    likely, gap = np.asarray(played.episode.probabilities)[step], float(played.draws[step])
+    return "drawn", {
+        "step": step,
+        "action": played.action(step),
+        "chance": float(likely[played.episode.actions[step]]),
+        "likeliest": played.action_names[int(likely.argmax())],
+        "gap": abs(gap),
+        "outcome": "better" if gap > 0.0 else "worse",
+    }
+
+
 def moved_by(change: FloatArray) -> FloatArray:
     """Returns `[...]`: how much moved from one component to another; 0 if the total changed.
 
@@ -119,10 +137,12 @@ def moved_by(change: FloatArray) -> FloatArray:
 
 
 def sizes(played: Played) -> FloatArray:
-    """Returns `[T′]`, in discounted reward, how much the steps of the revision surprise.
+    """Returns `[T′ + D]`, in discounted reward, how much each turn surprises.
 
-    That is how much the total changed; where as much is expected as before, how much moved.
+    Of a step of the revision that is how much the total changed; where as much is expected as
+    before, how much moved. Then comes what the draws at `Played.unlikely` changed.
     """
     change = played.revision.change
     moved = moved_by(change)
-    return np.where(moved > 0.0, moved, np.abs(change.sum(axis=1)))
+    revised = np.where(moved > 0.0, moved, np.abs(change.sum(axis=1)))
+    return np.append(revised, np.abs(played.draws[played.unlikely]))

@@ -50,7 +50,14 @@ def tabular_moment(
         tied_later=int((ambiguous & _later(table, state)).sum()) - here,
         what_ifs=tuple(what_ifs),
         uncertainty=_uncertainty(table, state),
+        possible=_possible(mdp),
     )
+
+
+def _possible(mdp: MDP) -> tuple[float, float]:
+    """Returns the least and the most that a component can be: 0 where all rewards have one sign."""
+    least, most = mdp.rewards.min(initial=0.0), mdp.rewards.max(initial=0.0)
+    return (-np.inf if least < 0.0 else 0.0), (np.inf if most > 0.0 else 0.0)
 
 
 def _totals_differ(totals: FloatArray, tied: BoolArray) -> BoolArray:

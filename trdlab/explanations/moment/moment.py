@@ -1,5 +1,6 @@
 """The moment that is explained: every action's decomposition, and what is known about it."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -85,6 +86,7 @@ class Moment:
         foils: the same of first actions that the policy does not take.
         seconds_per_step: how long a step takes as people play, if that is known.
         forbidden: the names of actions that cannot be taken here; they are none of the A.
+        possible: the least and the most that a component can be, as far as known.
     """
 
     decomposition: RewardDecomposition
@@ -103,6 +105,7 @@ class Moment:
     foils: "Calibration | None" = None
     seconds_per_step: float | None = None
     forbidden: tuple[str, ...] = ()
+    possible: tuple[float, float] = (-math.inf, math.inf)
 
     def __post_init__(self) -> None:
         if self.decomposition.shape != (len(self.action_names),):

@@ -65,11 +65,18 @@ def _forms(trial: Trial) -> dict[str, Form]:
         told = then(component, digits).strip()
         return f"{told}, " if told else ""
 
+    def alone(component: int | None, _: int) -> str:
+        steps = None if component is None else axis.steps(component)
+        if steps is None or steps[0] == 0 < steps[-1]:
+            return ""  # a time that begins with the action, or never ends, is not misread
+        return " in that step alone" if len(steps) == 1 else " in these steps alone"
+
     def does(in_all: str, of_a_part: str) -> Form:
         return Form(lambda component, _: in_all if component is None and whole else of_a_part)
 
     gained, leads = does("was worth", "gained"), does("is worth more than", "is ahead of")
-    return forms | {"at": Form(at), "then": Form(then), "gained": gained, "leads": leads}
+    of_time = {"at": Form(at), "then": Form(then), "alone": Form(alone)}
+    return forms | of_time | {"gained": gained, "leads": leads}
 
 
 TRIALS = Language[Trial]("this trial", _forms)
@@ -85,7 +92,7 @@ def tried(trial: Trial) -> Iterator[Fields]:
 
 # ---- whether what was forecast came --------------------------------------------------------------
 
-_MORE = "{component:at}{more} {component:gained} %s more than {less}"
+_MORE = "{component:at}{more} {component:gained} %s more than {less}{component:alone}"
 
 
 @TRIALS.kinds(
@@ -103,11 +110,11 @@ _MORE = "{component:at}{more} {component:gained} %s more than {less}"
         ),
         "against-the-forecast": (
             "The forecast was wrong: {more} was to be {said:number} ahead, but "
-            "{component:at}{less} {component:gained} {ahead:estimate} more."
+            "{component:at}{less} {component:gained} {ahead:estimate} more{component:alone}."
         ),
         "no-difference": (
-            "The forecast was wrong: {component:at}{more} {component:gained} the same as {less}, "
-            "though {said:number} more was forecast."
+            "The forecast was wrong: {component:at}{more} {component:gained} the same as "
+            "{less}{component:alone}, though {said:number} more was forecast."
         ),
         "too-few-tries": (
             "{copies:count} tries of each are too few to tell whether {more} "

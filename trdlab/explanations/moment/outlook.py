@@ -13,7 +13,7 @@ from trdlab.explanations.moment.leads import NOISE
 from trdlab.explanations.moment.moment import CHOICES, Choice
 from trdlab.explanations.moment.steps import LEAST_DISCOUNT, SHARE
 from trdlab.explanations.rules import Claim, Fields, Found, every
-from trdlab.formatting import DOUBT
+from trdlab.formatting import DOUBT, said
 
 _MOST_PARTS = 4  # that are named
 _SEEN = 0.02  # of all parts: what is less cannot be seen in two digits
@@ -23,12 +23,12 @@ _PEAK = 2.0  # times the mean of all other chances: what is likelier than that h
 
 def forecast(choice: Choice) -> list[Claim]:
     """Returns what else is expected of an action, and what cannot be told."""
-    return every(choice, *made_of, *outcomes[:-1], untold)
+    return every(choice, *made_of, *outcomes, untold)
 
 
 def contrast(choice: Choice) -> list[Claim]:
     """Returns what else is expected otherwise of its foil, if differences are to be trusted."""
-    return [] if every(choice, *untested_difference) else every(choice, decides, outcomes[-1])
+    return [] if every(choice, *untested_difference) else every(choice, decides, *differences)
 
 
 def in_brief(choice: Choice) -> list[Claim]:
@@ -90,46 +90,88 @@ def decides(choice: Choice) -> Iterator[Fields]:
             "Within {count:first} of {action}, {outcome:text} is likeliest {component:when}: "
             "{chance:likely}."
         ),
-        "counted": (
-            "With {action}, {outcome:text} {comes:text} {total:rough}{unit:text} "
-            "{last_step:within}, on average."
+        "comes-in": (
+            "With {action}, {outcome:text} comes in {total:rough} of {count:groups}, on average."
         ),
-        "differs": (
-            "{last_step:within}, {outcome:text} {comes:text} {total:rough}{unit:text} with "
-            "{action} and {other:rough}{unit:text} with {foil}, on average."
+        "comes-in-less": (
+            "With {action}, {outcome:text} comes in less than one of {count:groups}: {total:rough} "
+            "on average."
+        ),
+        "adds-up": (
+            "With {action}, {outcome:text} adds up to {total:rough}{unit:text} {last_step:within}, "
+            "on average."
         ),
     }
 )
 def outcomes(choice: Choice) -> Iterator[Found]:
-    """When an event is likeliest, or how often it comes; how much an amount adds up to.
+    """When an event is likeliest, or in how many steps it comes; how much an amount adds up to.
 
     The chance that an event comes at all is that of the only component that can be told, or at most
-    all chances together, if that is little. A group of steps counts once. Amounts are discounted
-    only with w > 1. What differs from the foil is no noise.
+    all chances together, if that is little; it is exactly these where the event ends the episode.
+    Of other events a group of steps counts once.
     """
-    axis, action = choice.time_axis, choice.action
-    is_full = axis.width == 1
+    for about, row, _ in _sums(choice):
+        peak, total = int(row.argmax()), about["total"]
+        if "unit" in about:
+            yield "adds-up", about
+        elif len(row) == 1 or _ends(choice, about["outcome"]) or total <= DOUBT:
+            yield "chance-of", about | {"chance": total}
+        elif row[peak] >= _PEAK * np.delete(row, peak).mean():
+            steps = {"component": peak, "chance": float(row[peak]), "count": about["last_step"] + 1}
+            yield "likeliest", about | steps
+        else:
+            yield "comes-in" if float(said(total, 2)) >= 1.0 else "comes-in-less", about
+
+
+@CHOICES.kinds(
+    {
+        "chances-differ": (
+            "{last_step:within}, there is {total:likely} of {outcome:text} with {action}, and "
+            "{other:likely} with {foil}."
+        ),
+        "comes-otherwise": (
+            "Of {count:groups}, {outcome:text} comes in {total:rough} with {action} and in "
+            "{other:rough} with {foil}, on average."
+        ),
+        "adds-up-otherwise": (
+            "{last_step:within}, {outcome:text} adds up to {total:rough}{unit:text} with {action} "
+            "and {other:rough}{unit:text} with {foil}, on average."
+        ),
+    }
+)
+def differences(choice: Choice) -> Iterator[Found]:
+    """What comes otherwise with the foil, and by so much that it is no noise."""
+    for about, row, others in _sums(choice):
+        is_once = len(row) == 1 or _ends(choice, about["outcome"])
+        kind = "chances-differ" if is_once else "comes-otherwise"
+        kind, least = ("adds-up-otherwise", 0.0) if "unit" in about else (kind, DOUBT)
+        for other in others:
+            size = max(abs(about["total"]), abs(other))
+            if abs(about["total"] - other) > max(least, SHARE * size):
+                yield kind, about | {"foil": choice.foil, "other": other}
+
+
+def _ends(choice: Choice, outcome: str) -> bool:
+    """Whether it ends the episode, so that its chances add up to the chance that it comes."""
+    known = choice.moment.outlook
+    return known is not None and outcome in known.endings
+
+
+def _sums(choice: Choice) -> Iterator[tuple[Fields, FloatArray, list[float]]]:
+    """Yields what can be told of each event and amount, its components, and the foil's sum if any.
+
+    Amounts have a unit: they are discounted, but with w = 1 not.
+    """
+    axis, is_full = choice.time_axis, choice.time_axis.width == 1
     full = np.maximum(axis.discounts, LEAST_DISCOUNT) if is_full else np.ones(axis.num_components)
-    for kind, comes, unit in (
-        ("events", "comes", " times"),
-        ("amounts", "adds up to", "" if is_full else " (discounted)"),
-    ):
+    unit: Fields = {"unit": "" if is_full else " (discounted)"}
+    for kind, weights in (("events", np.ones_like(full)), ("amounts", 1.0 / full)):
         for outcome, last_step, rows in _told(choice, kind):
-            is_event, row, i = kind == "events", rows[0], int(rows[0].argmax())
-            sums = rows.sum(axis=1) if is_event else (rows / full[: len(row)]).sum(axis=1)
-            total, *others = sums.tolist()
-            words = {"outcome": outcome, "comes": comes, "unit": unit}
-            about = {"action": action, "last_step": last_step, "total": total} | words
-            peak = {"component": i, "chance": float(row[i]), "count": last_step + 1}
-            if is_event and (len(row) == 1 or total <= DOUBT):
-                yield "chance-of", about | {"chance": total}
-            elif is_event and row[i] >= _PEAK * np.delete(row, i).mean():
-                yield "likeliest", about | peak
-            else:
-                yield "counted", about
-            for other in others:
-                if abs(total - other) > max(DOUBT * is_event, SHARE * max(abs(total), abs(other))):
-                    yield "differs", about | {"foil": choice.foil, "other": other}
+            about: Fields = {"count": rows.shape[1]} if kind == "events" else unit
+            sums = (rows * weights[: rows.shape[1]]).sum(axis=1)  # [1 or 2]
+            total, *others = np.minimum(sums, 1.0 if _ends(choice, outcome) else np.inf).tolist()
+            about = {"action": choice.action, "outcome": outcome, "total": total} | about
+            yield about | {"last_step": last_step}, rows[0], others
 
 
 @CHOICES.rule(

@@ -20,7 +20,7 @@ from trdlab.show.plots.calibration import trust_figure
 from trdlab.show.plots.comparison import comparison_figure
 from trdlab.show.plots.episode import story_figure
 from trdlab.show.plots.map import solved_figure, world_figure
-from trdlab.show.plots.moment import moment_figure, possible_range
+from trdlab.show.plots.moment import moment_figure
 from trdlab.show.plots.outcomes import outcomes_figure
 from trdlab.tabular import ExactTable
 
@@ -72,7 +72,6 @@ def part_figure(explained: Explanation, part: Picture) -> Figure | None:
         choice if part == "contrast" else replace(choice, foil=None),
         title,
         trial=explained.trial if part == "contrast" else None,
-        possible=possible_range(agent.estimator),
     )
 
 

@@ -18,7 +18,7 @@ from trdlab.gridworld import Gridworld
 from trdlab.gridworld.gridmap import MOVES
 from trdlab.gridworld.render import ABOVE_ROUTES, draw_map
 from trdlab.show.plots import bars, style
-from trdlab.show.plots.moment import moment_figure, names_of, possible_range, without_noise
+from trdlab.show.plots.moment import moment_figure, names_of, without_noise
 from trdlab.show.scenes import Scene, scene_of
 from trdlab.tabular import ExactTable
 
@@ -44,7 +44,6 @@ def solved_figure(solved: SolvedState) -> Figure:
     return moment_figure(
         replace(choice, moment=without_noise(choice.moment, bound)),
         scene.caption,
-        possible=possible_range(solved.table),
         above=(height, draw),
     )
 

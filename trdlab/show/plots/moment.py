@@ -10,18 +10,14 @@ from matplotlib.figure import Figure
 
 from trdlab.arrays import FloatArray
 from trdlab.decomposition import RewardDecomposition
-from trdlab.estimator import Estimator, Future
+from trdlab.estimator import Future
 from trdlab.explanations.calibration.calibration import Status
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.outcome import Trial
 from trdlab.formatting import decimals_between, decimals_for
 from trdlab.show.plots import bars, style
 from trdlab.show.plots.bars import Scale, plot_components, scale_of, settled
-from trdlab.tabular import ExactTable
 from trdlab.time_axis import axis_title
-
-Range = tuple[float, float]  # the least and the largest value that is possible
-ANY: Range = (-np.inf, np.inf)
 
 _PANEL = 1.75  # inches that one row of bars takes
 
@@ -32,7 +28,6 @@ def moment_figure(
     title: str = "",
     *,
     trial: Trial | None = None,
-    possible: Range = ANY,
     above: tuple[float, Callable[[Axes], object]] | None = None,
 ) -> Figure:
     """Returns the picture of an action, or of two and their difference (see `plot_moment`).
@@ -45,14 +40,14 @@ def moment_figure(
     axes = np.atleast_1d(figure.subplots(len(heights), 1, height_ratios=heights)).tolist()
     if above is not None:
         above[1](axes.pop(0))
-    plot_moment(axes, choice, trial=trial, possible=possible)
+    plot_moment(axes, choice, trial=trial)
     axes[len(axes) // 2].set_ylabel("expected discounted reward")
     _explain_marks(figure, choice, trial)
     return figure
 
 
 def plot_moment(
-    axes: Sequence[Axes], choice: Choice, *, trial: Trial | None = None, possible: Range = ANY
+    axes: Sequence[Axes], choice: Choice, *, trial: Trial | None = None
 ) -> Sequence[Axes]:
     """Draws an action; with a foil, both on one scale, and their difference below them.
 
@@ -60,15 +55,14 @@ def plot_moment(
         axes: one, or three that share their steps; they are returned.
         choice: the action and its foil.
         trial: what came of the two, where they were tried.
-        possible: the values that a component can have; whiskers end there.
     """
     moment, names = choice.moment, names_of(choice)
     values = [moment.q_value(name) for name in names]
     decimals = decimals_for(values) if len(values) == 1 else decimals_between(*values)
-    ends = [_ends(moment, name, possible) for name in names]
+    ends = [_ends(moment, name) for name in names]
     scale = scale_of(np.stack([moment.components(name) for name in names]), *ends)
     for ax, name, value in zip(axes, names, values, strict=False):
-        plot_action(ax, moment, name, scale=scale, possible=possible)
+        plot_action(ax, moment, name, scale=scale)
         _title(ax, f"{name}: Q = {style.told(value, decimals)}", moment.components(name))
     if choice.foil is not None:
         plot_contrast(axes[-1], moment, *names, trial=trial)
@@ -81,16 +75,14 @@ def plot_moment(
     return axes
 
 
-def plot_action(
-    ax: Axes, moment: Moment, action: str, *, scale: Scale | None = None, possible: Range = ANY
-) -> Axes:
+def plot_action(ax: Axes, moment: Moment, action: str, *, scale: Scale | None = None) -> Axes:
     """Draws what is expected of an action on `ax`, which is returned, with `whiskers`.
 
     What has not proved better than a guess stands on red or grey ground. Where the episode may end
     meanwhile, a dotted line is the chance that it is still running, with a scale on the right.
     Without a `scale` the axes show all bars of this action.
     """
-    components, ends = moment.components(action), _ends(moment, action, possible)
+    components, ends = moment.components(action), _ends(moment, action)
     scale = scale_of(components[None], ends) if scale is None else scale
     colour = style.action_colours(moment.action_names)[action]
     plot_components(ax, components, moment.time_axis, colour=colour, scale=scale)
@@ -163,14 +155,6 @@ def without_noise(moment: Moment, error: float) -> Moment:
     return replace(moment, decomposition=found, uncertainty=known)
 
 
-def possible_range(estimator: Estimator) -> Range:
-    """Returns the values that components can have: of one sign where all rewards surely are."""
-    if not isinstance(estimator, ExactTable):
-        return ANY
-    rewards = estimator.mdp.rewards
-    return 0.0 if (rewards >= 0.0).all() else ANY[0], 0.0 if (rewards <= 0.0).all() else ANY[1]
-
-
 def _title(ax: Axes, text: str, components: FloatArray) -> None:
     """Writes the title of bars, above their numbers if there are any."""
     pad = 20.0 if bars.numbers(settled(components)) else 6.0
@@ -213,12 +197,12 @@ def _lengths(moment: Moment, action: str) -> FloatArray:
     return np.zeros(moment.time_axis.num_components) if judged is None else judged.off_by
 
 
-def _ends(moment: Moment, action: str, possible: Range) -> FloatArray | None:
+def _ends(moment: Moment, action: str) -> FloatArray | None:
     """Returns `[2, N+1]`: where whiskers end, NaN where there are none; None if there are none."""
     means, length = moment.components(action), _lengths(moment, action)
     if not (length > 0.0).any():
         return None
-    least, most = possible
+    least, most = moment.possible
     if moment.only_reward is not None:
         least, most = (0.0, most) if moment.only_reward > 0.0 else (least, 0.0)
     low = np.minimum(np.maximum(means - length, least), means)

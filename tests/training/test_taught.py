@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import trdlab
 from trdlab.agents.teachers import find_teacher
@@ -18,6 +19,7 @@ from trdlab.errors import InputError, TrdlabError
 from trdlab.estimator import Estimator
 from trdlab.policies import Policy
 from trdlab.runs import RunFolder, best_step, checkpoint_steps, list_runs, read_metrics
+from trdlab.show.plots.training import learning_curves
 from trdlab.show.training import runs_page
 from trdlab.training.loading import evaluate_run, load
 from trdlab.training.run import Run, begin, carry_on, resume
@@ -135,6 +137,13 @@ def test_checkpoints_stand_at_the_ends_of_phases_and_only_the_students_have_scor
 def test_a_run_among_others_shows_how_far_it_is_by_its_clock(poled):
     shown = runs_page(list_runs(poled.parent), width=100).plain
     assert re.search(r"poled +CartPole-v1 +2 +1 +500 .* done", shown)
+
+
+def test_a_learning_curve_is_that_of_the_student(poled):
+    rows = read_metrics(poled / "metrics.jsonl")
+    ax = learning_curves(Figure().subplots(), {"poled": rows}, value="epsilon")
+    (line,) = ax.get_lines()
+    assert line.get_xdata().tolist() == [0, *range(20, 241, 20)]
 
 
 # ---- picked up -----------------------------------------------------------------------------------

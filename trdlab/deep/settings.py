@@ -68,7 +68,10 @@ class TrainSettings:
         1, "Steps to hold a random action: 1 to so many, drawn evenly.", "Acting", least=1
     )
     learning_starts: int = option(
-        1_000, "Agent steps, at random, before the first update.", "Learning", least=1
+        1_000,
+        "Agent steps before the first update; at random, unless there is a teacher.",
+        "Learning",
+        least=1,
     )
     update_every: int = option(4, "Agent steps for each update.", "Learning", least=1)
     batch_size: int = option(32, "Windows in each update.", "Learning", least=1)
@@ -98,7 +101,9 @@ class TrainSettings:
         "Learning",
         kind=float,
     )
-    double: bool = option(False, "Double DQN: the online network chooses.", "Learning")
+    double: bool = option(
+        False, "Double DQN: the online network chooses; not with a policy head.", "Learning"
+    )
     precision: Literal["auto", "float32", "bfloat16"] = option(
         "float32",
         "float32; bfloat16, less exact and often quicker; or auto: the quicker one here.",
@@ -152,7 +157,9 @@ class TrainSettings:
         TEACHING,
     )
     temperature: float = option(
-        1.0, "Above 1 it evens out the probabilities that are compared.", TEACHING
+        1.0,
+        "Of the probabilities that are compared: above 1 evens them out, below sharpens them.",
+        TEACHING,
     )
     draw: bool = option(
         False, "With a policy head: draw actions, rather than take the likeliest.", TEACHING

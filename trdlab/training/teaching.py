@@ -21,10 +21,9 @@ from trdlab.rollouts.evaluation import score
 from trdlab.rollouts.playing import Watch, unwatched, usual_limit
 from trdlab.runs import RunFolder
 from trdlab.statistics import Estimate
+from trdlab.training.loading import EVALUATION_SEED
 from trdlab.training.setup import make_environments
 
-TEACHER_SEED = 3000
-"""Of the episodes in which teachers are measured: no other seed of a run is the same."""
 EPISODES = 30
 """That a teacher plays to be measured, and chance too."""
 _TEACHER = "teacher"
@@ -111,7 +110,7 @@ def measure(
             EPISODES,
             epsilon=epsilon,
             enough=usual_limit(settings.time_axis),
-            seed=TEACHER_SEED,
+            seed=EVALUATION_SEED,  # from the starts of an evaluation, which can be compared then
             watch=watch,
         ).mean
 

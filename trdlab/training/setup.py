@@ -105,9 +105,10 @@ def _made(settings: TrainSettings, num_envs: int | None, seed: int | None) -> En
     count = settings.num_envs if num_envs is None else num_envs
     seed = settings.seed if seed is None else seed
     if settings.kind == "atari":
-        from trdlab.atari import AtariEnvironments
+        from trdlab.atari import AtariEnvironments, GreyAndColour
 
-        return AtariEnvironments(settings.env, count, seed=seed, **_for_atari(arguments))
+        made = GreyAndColour if arguments.pop("screens", False) else AtariEnvironments
+        return made(settings.env, count, seed=seed, **_for_atari(arguments))
     from trdlab.environments import GymEnvironments
 
     return GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments)

@@ -14,7 +14,8 @@ from trdlab.environments import NotCopyable, NotReproducible, Step
 from trdlab.environments.stack import FrameStack, observation_space
 from trdlab.errors import InputError, TrdlabError
 
-TOLD = [of.name for of in fields(Step) if of.name not in ("allowed", "info")]  # [B, ...] each
+_MORE = ("allowed", "screens", "info")
+TOLD = [of.name for of in fields(Step) if of.name not in _MORE]  # [B, ...] each
 
 
 def same(a: Step, b: Step) -> bool:

@@ -14,7 +14,9 @@ from matplotlib.figure import Figure
 import trdlab
 from trdlab.agents.teachers import find_teacher
 from trdlab.cli import main
+from trdlab.deep.lessons import Levels
 from trdlab.deep.settings import TrainSettings
+from trdlab.deep.trainer import Trainer
 from trdlab.errors import InputError, TrdlabError
 from trdlab.estimator import Estimator
 from trdlab.policies import Policy
@@ -335,6 +337,65 @@ def test_a_run_teaches_by_the_checkpoint_that_it_was_then(learned, tmp_path):
     assert re.fullmatch("[0-9a-f]{64}", run.manifest["teacher"]["sha256"])
     with resume(out, find=find_teacher) as held:
         assert held.trainer.done
+
+
+# ---- games ---------------------------------------------------------------------------------------
+
+PLAYERS = """
+import numpy as np
+from trdlab.policies.adapted import About
+
+class Player:
+    def __init__(self, seen, **games):
+        self.about, self.seen = About("a player", seen=seen, num_actions=4, games=games), []
+
+    def act(self, observations, state, begins):
+        self.seen.append(np.shape(observations))
+        return np.tile([0.0, 0.4, 0.3, 0.3], (len(observations), 1)), None
+
+def looks_at_screens():
+    return Player((210, 160, 3), screens=True)
+
+def separates_lives():
+    return Player((4, 84, 84), separate_lives=True)
+"""
+
+
+def test_a_teacher_is_shown_what_it_looks_at_and_the_student_what_it_knows(tmp_path):
+    (tmp_path / "players.py").write_text(PLAYERS)
+    lines = FEW | {"teacher": f"python:{tmp_path / 'players.py'}:looks_at_screens"}
+    lines |= {"teacher_steps": 24, "offline_updates": 2, "distil": "policy", "device": "cpu"}
+    settings = TrainSettings("atari", "Breakout").changed(lines)
+    found = find_teacher(settings)
+    assert (found.needs, found.beside) == ((), ("screens=true",))
+    assert found.settled(settings).env_arg == ()  # evaluations do without the screens
+
+    def begun() -> Trainer:
+        environments = found.make(settings)
+        return Trainer(settings, environments, (found.teacher(settings), Levels(9.0, 1.0)))
+
+    whole, first, second = begun(), begun(), begun()
+    found.policy.seen.clear()  # type: ignore[attr-defined]
+    for _ in range(5):
+        first.step()
+    assert set(found.policy.seen) == {(2, 210, 160, 3)}  # type: ignore[attr-defined]
+    assert first.memory.sample(1, np.random.default_rng(0)).observations.shape == (1, 4, 84, 84)
+    second.load_state_dict(first.state_dict())
+    for run in (whole, second):
+        while run.agent_steps < 8:
+            run.step()
+    assert np.array_equal(whole.stack.observations, second.stack.observations)
+    assert np.array_equal(whole.environments.screens, second.environments.screens)
+
+
+def test_a_game_is_played_as_the_teacher_knows_it(tmp_path):
+    (tmp_path / "players.py").write_text(PLAYERS)
+    name = f"python:{tmp_path / 'players.py'}:separates_lives"
+    settings = TrainSettings("atari", "Breakout").changed(FEW | {"teacher": name})
+    found = find_teacher(settings)
+    settled = found.settled(settings)
+    assert settled.env_arg == ("separate_lives=true",)
+    assert find_teacher(settled).settled(settled).env_arg == settled.env_arg
 
 
 # ---- settings and commands -----------------------------------------------------------------------

@@ -18,10 +18,11 @@ from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Unfitted
 from trdlab.policies import Memoryless, Policy, ask
-from trdlab.policies.adapted import About
+from trdlab.policies.adapted import About, games_for, sees_screens
 from trdlab.policies.functions import as_they_are, from_function
 from trdlab.policies.registry import policy_of
 from trdlab.rollouts.branches import Copying
+from trdlab.rollouts.playing import shown
 from trdlab.tabular import ExactTable, exact
 from trdlab.time_axis import TimeAxis
 
@@ -40,7 +41,8 @@ def agent_of(what: Any, env: Any, env_arguments: Sequence[str], axis: TimeAxis) 
     """
     known = what.estimator if isinstance(what, Agent) and what.is_fitted else what
     own = getattr(known, "time_axis", axis)
-    place = None if env is None else find_place(env, env_arguments, own)
+    wanted = games_for(what.policy if isinstance(what, Agent) else what)
+    place = None if env is None else find_place(env, env_arguments, own, wanted=wanted)
     if isinstance(what, Agent):
         if place is None:
             return what
@@ -127,6 +129,8 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
     with closing(place.make(1, 0)) as environments:
         found = Interface.of(environments)
         first = FrameStack(environments.reset(), environments.stack, environments.padding)
+        screens = getattr(environments, "screens", None)
+        looked_at = shown(who, environments, first) if screens is not None else first.observations
     seen, count = first.observations, len(found.action_names)
     agent = Agent(
         name=name,
@@ -136,6 +140,9 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
         seconds_per_step=found.seconds_per_step,
         copying=place.copying,
     )
+    about = getattr(who, "about", None)
+    if isinstance(about, About):
+        about.check_fits(_looking(found, looked_at, who), place.name, name)
     if isinstance(who, Estimator):
         told = np.shape(who.decompose(seen).components)
         wanted = (1, count, who.time_axis.num_components)
@@ -146,18 +153,23 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
             )
         return replace(agent, estimator=who, policy=who if isinstance(who, Policy) else None)
     if not isinstance(who, Policy):
-        shown = found.space.unflat if isinstance(found.space, FlatSpace) else as_they_are
-        who = from_function(who, np.repeat(seen, 2, axis=0), count, shown)
-    about = getattr(who, "about", None)
-    if isinstance(about, About):
-        about.check_fits(found, place.name, name)
-    given = ask(who, seen)[0].shape[1]
+        unflat = found.space.unflat if isinstance(found.space, FlatSpace) else as_they_are
+        who = from_function(who, np.repeat(seen, 2, axis=0), count, unflat)
+    given = ask(who, looked_at)[0].shape[1]
     if given != count:
         raise InputError(
             f"'{name}' gives {given} probabilities, and '{place.name}' has {found.done}.",
             "It must give one for each action.",
         )
     return replace(agent, policy=who)
+
+
+def _looking(found: Interface, looked_at: Any, who: Any) -> Interface:
+    """Returns an interface as somebody meets it: with the whole screens, if it looks at those."""
+    if not sees_screens(who):
+        return found
+    space = gym.spaces.Box(0, 255, np.shape(looked_at)[1:], np.uint8)
+    return replace(found, space=space)
 
 
 def _model_around(table: ExactTable, env: Any) -> Model:

@@ -24,7 +24,7 @@ from trdlab.environments.naming import are_own, is_numbered
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
 from trdlab.policies import Policy, acting
-from trdlab.policies.adapted import About
+from trdlab.policies.adapted import About, games_for
 from trdlab.policies.files import Options
 from trdlab.policies.functions import PYTHON, from_python
 from trdlab.policies.registry import read_policy
@@ -35,7 +35,7 @@ from trdlab.time_axis import TimeAxis
 from trdlab.training.fitted import load_fit
 
 _OWN_AXIS = "is a run with its own γ, N and w."
-_UNKNOWN_AXIS = "gets γ, N and w when it is fitted."
+_UNKNOWN_AXIS = "has γ, N and w of its own, or gets them when it is fitted."
 _LEAVE_OUT = "Leave out `gamma`, `horizon` and `width`."
 
 
@@ -174,15 +174,21 @@ def _read(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
     """Returns the agent in a file of another library, named with what that does not say."""
     file, arguments = parse_name(name)
     path = Path(file)
-    policy = read_policy(path, Options.of(arguments))
+
+    def num_actions() -> int | None:
+        if env is None:
+            return None
+        return len(look(find_place(env, env_arguments, AXIS).make).action_names)
+
+    who = read_policy(path, Options.of(arguments), num_actions)
     if env is None:
-        about: About = getattr(policy, "about")  # noqa: B009  which every adapter gives
+        about: About = getattr(who, "about")  # noqa: B009  which every adapter gives
         raise InputError(
             f"Nothing says where '{file}' acts: it is a {about.title}.",
             f"Give its `env`: it needs {about.needs}.",
         )
-    place = find_place(env, env_arguments, AXIS)
-    agent = acting_agent(policy, place, path.stem)
+    place = find_place(env, env_arguments, AXIS, wanted=games_for(who))
+    agent = acting_agent(who, place, path.stem)
     return replace(agent, origin=place.origin(name, None, away=True))
 
 

@@ -1,6 +1,6 @@
 """Where an agent acts: its own environments, or others that it is put into."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import astuple, dataclass, replace
 from functools import partial
@@ -12,7 +12,7 @@ from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 
 from trdlab.agents.models import Model, World, find_model, is_model, model_of
 from trdlab.decomposition import TimeAxis
-from trdlab.environments.arguments import parse_arguments
+from trdlab.environments.arguments import parse_arguments, say_arguments
 from trdlab.environments.batches import Make
 from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.interface import Interface
@@ -119,7 +119,12 @@ class Place:
 
 
 def find_place(
-    env: Where, env_arguments: Sequence[str], time_axis: TimeAxis, *, games: bool = False
+    env: Where,
+    env_arguments: Sequence[str],
+    time_axis: TimeAxis,
+    *,
+    games: bool = False,
+    wanted: Mapping[str, Any] | None = None,
 ) -> Place:
     """Returns the place of a name, or of an environment.
 
@@ -130,6 +135,7 @@ def find_place(
         env_arguments: what to make one of an id with, as `KEY=VALUE`.
         time_axis: of the agent; episodes of a model without a limit last four horizons or longer.
         games: whether each name that is not of a model is meant to be that of an Atari game.
+        wanted: how an Atari game is to be played for who acts there, where nothing else is said.
 
     Raises:
         InputError: there is no such model, or it is given arguments that are not in its name.
@@ -147,7 +153,11 @@ def find_place(
     if named and (games or _is_game(source)):
         from trdlab.deep.settings import TrainSettings
 
-        return place_of(TrainSettings("atari", source, env_arg=tuple(env_arguments)))
+        said = parse_arguments(env_arguments)
+        more = {name: value for name, value in (wanted or {}).items() if name not in said}
+        words = (*env_arguments, *(say_arguments({name: value}) for name, value in more.items()))
+        place = place_of(TrainSettings("atari", source, env_arg=words))
+        return replace(place, env_arguments=tuple(env_arguments))
     arguments = parse_arguments(env_arguments)
 
     def made(num_envs: int, seed: int) -> GymEnvironments:

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 from trdlab.agents.agent import Agent
 from trdlab.agents.naming import find_agent
+from trdlab.environments.arguments import parse_arguments, say_arguments
 from trdlab.errors import InputError
-from trdlab.policies import acting
+from trdlab.policies import Policy, acting
+from trdlab.policies.adapted import games_for
 from trdlab.policies.functions import PYTHON
 from trdlab.runs import RunFolder, checkpoint_steps, find_checkpoint
 from trdlab.runs.folder import is_fit, is_run
@@ -37,7 +39,17 @@ def find_teacher(settings: "TrainSettings") -> Candidate:
     else:
         on_scale = getattr(policy, "gamma", None) in (None, settings.gamma)
     values = _sums(agent) if by_estimate else getattr(policy, "q_values", None)
-    return Candidate(name, file, policy, values, on_scale)
+    needs, beside = _of_games(settings, policy)
+    return Candidate(name, file, policy, values, on_scale, needs, beside)
+
+
+def _of_games(settings: "TrainSettings", policy: Policy) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Returns how a game is to be played for a teacher, and what is to be shown to it alone."""
+    said = parse_arguments(settings.env_arg)
+    wanted = {name: value for name, value in games_for(policy).items() if name not in said}
+    words = {name: say_arguments({name: value}) for name, value in wanted.items()}
+    beside = (words.pop("screens"),) if "screens" in words else ()
+    return tuple(words.values()), beside
 
 
 def _sums(agent: Agent) -> Any:

@@ -9,5 +9,6 @@ if TYPE_CHECKING:
     from trdlab.atari.game import AtariGame as AtariGame
     from trdlab.atari.names import find_game as find_game
     from trdlab.atari.names import game_names as game_names
+    from trdlab.atari.views import GreyAndColour as GreyAndColour
 else:
     __getattr__ = lazily(__name__)

@@ -8,9 +8,17 @@ import numpy as np
 
 from trdlab.arrays import BoolArray, IntArray
 from trdlab.atari.names import find_game
-from trdlab.atari.vector import FRAME, FRAMES_PER_SECOND, STACK, action_names, make_vector
+from trdlab.atari.vector import (
+    FRAME,
+    FRAMES_PER_SECOND,
+    STACK,
+    action_names,
+    make_vector,
+    screen_shape,
+)
 from trdlab.environments.history import Histories, checked_actions
 from trdlab.environments.protocol import Frames, NotCopyable, Padding, Step
+from trdlab.environments.stack import FrameStack, stacked
 
 RESEED_AFTER = 5000
 """Steps after which a game is seeded anew at the end of its episode.
@@ -39,6 +47,11 @@ class AtariEnvironments:
         frame_skip: for how many frames an action is held; a frame shows the maximum of the last
             two of them.
         full_action_space: all 18 actions, in place of those that the game knows.
+        colour: a frame is the whole screen in colour, such as `(210, 160, 3)`, the last of those
+            for which an action is held; nothing is stacked.
+        separate_lives: each life begins as a game does: with FIRE, whatever is chosen (where there
+            is one; nothing else is `allowed` then), and with a stack of zeros. A frame is the whole
+            stack then.
 
     Raises:
         InputError: there is no such game, or a value is out of its range.
@@ -51,10 +64,8 @@ class AtariEnvironments:
     [0.0, 0.0]
     """
 
-    observation_space: gym.Space[Any] = FRAME
     first_action = 0
     shared_chance = False
-    stack: int | None = STACK
     padding: Padding = "zero"
     frames_per_second: float | None = FRAMES_PER_SECOND
 
@@ -69,8 +80,11 @@ class AtariEnvironments:
         max_frames: int = 108_000,
         frame_skip: int = 4,
         full_action_space: bool = False,
+        colour: bool = False,
+        separate_lives: bool = False,
     ) -> None:
         self.game, self.num_envs, self.frame_skip = find_game(game), num_envs, frame_skip
+        self.colour, self.separate_lives = colour, separate_lives
         options: dict[str, Any] = {
             "sticky": sticky,
             "noop_max": noop_max,
@@ -78,16 +92,35 @@ class AtariEnvironments:
             "frame_skip": frame_skip,
             "full_action_space": full_action_space,
         }
-        self._options = options
-        settings = {"game": self.game, **options}
+        views = {"colour": colour, "separate_lives": separate_lives}
+        self._options = {**options, **views}
+        told = {name: on for name, on in views.items() if on}  # those of older runs have neither
+        settings = {"game": self.game, **options, **told}
         self._histories = Histories(
             settings, num_envs=num_envs, seed=seed, reseed_after=RESEED_AFTER
         )
-        self._envs = make_vector(self.game, num_envs, stack=1, **options)
+        self._envs = make_vector(self.game, num_envs, stack=1, colour=colour, **options)
         self.action_names = action_names(self._envs)
         self.num_actions = len(self.action_names)
+        self.stack: int | None = None if colour or separate_lives else STACK
+        self.observation_space: gym.Space[Any] = FRAME
+        if colour:
+            self.observation_space = gym.spaces.Box(0, 255, screen_shape(self.game), np.uint8)
+        elif separate_lives:
+            self.observation_space = stacked(FRAME, STACK)
         self.time_limit: int | None = -(-max_frames // frame_skip)
         self._lives = np.zeros(num_envs, dtype=np.int64)
+        self._fire = self.action_names.index("FIRE") if "FIRE" in self.action_names else None
+        self._opens = np.zeros(num_envs, dtype=np.bool_)  # [B], whether a life has just begun
+        self._stack: FrameStack | None = None  # what is seen of lives that are apart
+
+    @property
+    def allowed(self) -> BoolArray | None:
+        """`[B, A]`, which actions can be taken now; None where all can always be."""
+        if not self.separate_lives or self._fire is None:
+            return None
+        is_fire = np.arange(self.num_actions) == self._fire
+        return np.asarray(is_fire | ~self._opens[:, None])
 
     def reset(self) -> Frames:
         """Begins a game in every environment, and returns their first frames `[B, 84, 84]`."""
@@ -166,6 +199,8 @@ class AtariEnvironments:
         """Nothing: ale-py's threads end with the object."""
 
     def _act(self, actions: IntArray, active: BoolArray | None = None) -> Step:
+        if self._fire is not None:
+            actions = np.where(self._opens, self._fire, actions)
         observations, paid, terminated, truncated, info = self._envs.step(actions)
         frames, rewards = observations[:, 0], paid.astype(np.float64)  # [B, 84, 84], [B]
         acts = np.ones(self.num_envs, dtype=np.bool_) if active is None else active
@@ -180,12 +215,14 @@ class AtariEnvironments:
         life_lost = (
             (lives < self._lives) & (lives > 0) & ~ended & acts
         )  # [B]; lives can also be won
-        self._lives, following = lives, frames
+        self._lives, self._opens = lives, life_lost & self.separate_lives
+        frames = following = self._seen(frames, life_lost)
         if ended.any():
             following = self._begin(
                 ended, [self._next_seed(e) for e in np.flatnonzero(ended).tolist()]
             )
-        return Step(frames, rewards, terminated, truncated, life_lost, following)
+        told = rewards, terminated, truncated, life_lost
+        return Step(frames, *told, following, self.allowed)
 
     def _play_again(self, past: Sequence[IntArray], begin: Callable[[int], int]) -> Frames:
         """Plays games again, side by side; returns the frames the next action is chosen at.
@@ -214,7 +251,19 @@ class AtariEnvironments:
         """Begins a game `where [B]`; returns `[B, 84, 84]`, the present frames of all."""
         observations, info = self._envs.reset(seed=np.array(seeds), options={"reset_mask": where})
         frames: Frames = observations[:, 0]  # [B, 84, 84]
-        self._lives = info["lives"]
+        self._lives, self._opens = info["lives"], self._opens & ~where
         for env in np.flatnonzero(where).tolist():
             self._histories.record_reset(env, frames)
-        return frames
+        if self._stack is None and self.stack is None and not self.colour:
+            self._stack = FrameStack(frames, STACK, self.padding)
+        if self._stack is None:
+            return frames
+        self._stack.begin(frames, where)
+        return self._stack.observations.copy()
+
+    def _seen(self, frames: Frames, begins: BoolArray) -> Frames:
+        """Returns what is seen where the next frames are `[B, ...]`, and a life `begins [B]`."""
+        if self._stack is None:
+            return frames
+        self._stack.push(frames, begins)
+        return self._stack.observations.copy()

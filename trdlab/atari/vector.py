@@ -23,6 +23,30 @@ STACK = 4
 FRAMES_PER_SECOND = 60.0
 FRAME = gym.spaces.Box(0, 255, (SIDE, SIDE), np.uint8)
 
+_WIDTH, _HEIGHT = 160, 210  # of most screens
+_TALL = (
+    *("Adventure", "AirRaid", "KeystoneKapers", "KingKong", "Klax", "LaserGates", "MrDo"),
+    *("Pacman", "SirLancelot", "SpaceWar"),
+)
+_HEIGHTS = {  # of the others: ale-py's vector environment does not tell them
+    **dict.fromkeys(_TALL, 250),
+    "Carnival": 214,
+    "JourneyEscape": 230,
+    "Pooyan": 220,
+}
+
+
+def screen_shape(game: str) -> tuple[int, int, int]:
+    """Returns the shape of the whole screen of a game in colour.
+
+    Args:
+        game: as `find_game` returns it.
+
+    >>> screen_shape("Breakout"), screen_shape("AirRaid")
+    ((210, 160, 3), (250, 160, 3))
+    """
+    return _HEIGHTS.get(game, _HEIGHT), _WIDTH, 3
+
 
 def make_vector(
     game: str,
@@ -34,6 +58,7 @@ def make_vector(
     max_frames: int,
     frame_skip: int,
     full_action_space: bool,
+    colour: bool = False,
 ) -> AtariVectorEnv:
     """Returns `num_envs` games that pay raw rewards and end where the game does.
 
@@ -49,6 +74,7 @@ def make_vector(
         max_frames: of the emulator, after which an episode is truncated.
         frame_skip: for how many frames an action is held.
         full_action_space: all 18 actions, in place of those that the game knows.
+        colour: frames are whole screens in colour, the last of those that are skipped.
 
     Raises:
         InputError: a value is out of its range.
@@ -64,16 +90,17 @@ def make_vector(
     for name, (value, least) in counts.items():
         if value < least:
             raise InputError(f"The value of {name} is {value}.", f"It is at least {least}.")
+    height, width = screen_shape(game)[:2] if colour else (SIDE, SIDE)
     try:
         with redirect_stdout(sys.stderr):  # where ale-py says that it found ALE_ROMS_DIR
             return AtariVectorEnv(
                 rom_name(game),
                 num_envs,
                 stack_num=stack,
-                img_height=SIDE,
-                img_width=SIDE,
-                grayscale=True,
-                maxpool=True,
+                img_height=height,
+                img_width=width,
+                grayscale=not colour,
+                maxpool=not colour,
                 reward_clipping=False,
                 # This would reset the whole game at each lost life, and life_loss_info would
                 # report lost lives and the end of the game by one and the same flag.

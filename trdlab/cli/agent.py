@@ -15,8 +15,9 @@ def agent(
         str,
         typer.Argument(
             metavar="AGENT",
-            help="A file: an archive of Stable-Baselines3, CleanRL's weights, or linear layers; "
-            "with what it does not say after commas, such as ppo.zip,activation=relu. Or "
+            help="A file: an archive of Stable-Baselines3, weights of CleanRL, baby-a3c, ACKTR or "
+            "the paper's authors, or linear layers; with what it does not say after commas, such "
+            "as ppo.zip,activation=relu. Or "
             "python:FILE.py:FUNCTION, whose function makes an agent. Or any other AGENT.",
         ),
     ],
@@ -74,7 +75,7 @@ def draws(found: "Agent") -> bool:
 
 def _data(found: "Agent") -> dict[str, Any]:
     """Returns what is known about an agent, as plain data."""
-    about = getattr(found.policy, "about", None)
+    about = getattr(found.policy or found.estimator, "about", None)
     return {
         "name": found.name,
         "about": about and about.to_dict(),

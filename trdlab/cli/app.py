@@ -16,6 +16,7 @@ COMMANDS = {
     "compare": "trdlab.cli.compare",
     "agent": "trdlab.cli.agent",
     "fit": "trdlab.cli.fit",
+    "games": "trdlab.cli.games",
     "train": "trdlab.cli.train",
     "resume": "trdlab.cli.train",
     "evaluate": "trdlab.cli.train",

@@ -101,15 +101,19 @@ class Lessons:
         """Returns what the teacher says now; to be asked once at each step of all episodes."""
         state = None if self._begins.all() else self._remembered
         seen = shown(self.teacher.policy, environments, stack)
-        lesson, self._remembered = self.teacher.ask(seen, state, self._begins)
+        allowed = getattr(environments, "allowed", None)
+        lesson, self._remembered = self.teacher.ask(seen, state, self._begins, allowed)
         return lesson
 
-    def actions(self, lesson: Lesson, rng: np.random.Generator) -> IntArray:
+    def actions(
+        self, lesson: Lesson, environments: Environments, rng: np.random.Generator
+    ) -> IntArray:
         """Returns what the teacher does `[B]`, now and then at random."""
+        allowed = getattr(environments, "allowed", None)
         count, num_actions = len(lesson.likely), lesson.likely.shape[1]
         own = drawn(lesson.likely, rng.random(count))
         random = rng.random(count) < self.settings.teacher_epsilon
-        return np.where(random, any_actions(rng, count, num_actions), own)
+        return np.where(random, any_actions(rng, count, num_actions, allowed), own)
 
     def follow(self, ended: BoolArray) -> None:
         """Takes note of where episodes `[B]` have ended, and others begun."""

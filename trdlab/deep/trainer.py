@@ -205,7 +205,7 @@ class Trainer:
     def _choose(self, lesson: Lesson | None) -> IntArray:
         """Returns the actions `[B]`: the teacher's, or at random with probability ε, else own."""
         if self.lessons and lesson and self.phase == "teacher":
-            return self.lessons.actions(lesson, self.rng)
+            return self.lessons.actions(lesson, self.environments, self.rng)
         epsilon = self.settings.epsilon(self.agent_steps)
         explore, actions = self.exploring.draw(epsilon, self.rng)  # [B], [B]
         if not explore.all():

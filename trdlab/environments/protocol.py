@@ -46,6 +46,8 @@ class Step:
         following: `[B, ...]`, the frame that the next action is chosen at: that of `frames`, or
             the first one of the next episode where one ended.
         allowed: `[B, A]`, which actions could be taken at `frames`; None where all can always be.
+        screens: `[B, H, W, 3]`, what `frames` shows as a whole screen in colour; None where the
+            environments do not show that, too.
         info: from an environment's number to what else it tells of the step, for as long as no
             other step has been taken.
     """
@@ -57,6 +59,7 @@ class Step:
     life_lost: BoolArray
     following: Frames
     allowed: BoolArray | None = None
+    screens: Frames | None = None
     info: Callable[[int], Mapping[str, Any]] = _no_info
 
     @property
@@ -133,6 +136,16 @@ class MaskedEnvironments(Environments, Protocol):
     """
 
     allowed: BoolArray | None
+
+
+class ScreenedEnvironments(Environments, Protocol):
+    """Environments that show whole screens beside what is seen, for agents that look at those.
+
+    Attributes:
+        screens: `[B, H, W, 3]`, in colour, at which the next action is chosen.
+    """
+
+    screens: Frames
 
 
 class CopyableEnvironments(Environments, Protocol):

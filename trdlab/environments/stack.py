@@ -14,7 +14,16 @@ def observation_space(environments: Environments) -> gym.spaces.Space[Any]:
     frame = environments.observation_space
     if environments.stack is None or not isinstance(frame, gym.spaces.Box):
         return frame
-    low, high = (np.stack([bound] * environments.stack) for bound in (frame.low, frame.high))
+    return stacked(frame, environments.stack)
+
+
+def stacked(frame: gym.spaces.Box, size: int) -> gym.spaces.Box:
+    """Returns the space of stacks `[k, ...]` of frames.
+
+    >>> stacked(gym.spaces.Box(0, 255, (84, 84), np.uint8), 4).shape
+    (4, 84, 84)
+    """
+    low, high = (np.stack([bound] * size) for bound in (frame.low, frame.high))
     return gym.spaces.Box(low, high, dtype=frame.dtype.type)
 
 

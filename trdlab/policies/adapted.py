@@ -9,9 +9,12 @@ import gymnasium as gym
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray
+from trdlab.decomposition import RewardDecomposition
 from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
-from trdlab.policies.ready import greedy
+from trdlab.estimator import Future
+from trdlab.policies.ready import Greedy, greedy
+from trdlab.time_axis import TimeAxis
 
 NEAREST = (
     "A decomposition has one row per action. Let the environment take a few by their numbers "
@@ -39,6 +42,8 @@ class About:
         draws: whether it draws its actions from probabilities, rather than taking the best.
         parts: the shapes of what it sees by name, in order, where it sees a Dict; all of them
             together make one vector then (see `FlatSpace`).
+        games: how Atari games are to be played for it, as arguments of `AtariEnvironments`; with
+            `screens` it is shown whole screens in colour (see `GreyAndColour`).
 
     >>> About("PPO", "Stable-Baselines3", "2.0", (4,), 2).title
     'PPO of Stable-Baselines3 2.0'
@@ -55,6 +60,7 @@ class About:
     gamma: float | None = None
     draws: bool = True
     parts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    games: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -99,7 +105,17 @@ class About:
         """Returns plain data, for JSON."""
         parts = {name: list(shape) for name, shape in self.parts.items()}
         seen = None if self.seen is None else list(self.seen)
-        return {**asdict(self), "seen": seen, "parts": parts}
+        return {**asdict(self), "seen": seen, "parts": parts, "games": dict(self.games)}
+
+
+def games_for(who: Any) -> Mapping[str, Any]:
+    """Returns how Atari games are to be played for somebody, if that is said (see `About`)."""
+    return getattr(getattr(who, "about", None), "games", {})
+
+
+def sees_screens(who: Any) -> bool:
+    """Returns whether somebody looks at whole screens, rather than at what is seen."""
+    return bool(games_for(who).get("screens"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +176,38 @@ class Valuing:
         return values
 
 
+@dataclass(frozen=True, eq=False)
+class Student:
+    """An estimator in a file, that acts by the largest Σ components.
+
+    Args:
+        about: what is known about it.
+        network: from observations `[B, ...]` to components `[B, A·(N+1)]`.
+        time_axis: γ, N and w.
+        future: whose future it tells.
+    """
+
+    about: About
+    network: Callable[[Any], FloatArray]
+    time_axis: TimeAxis
+    future: Future
+
+    @property
+    def gamma(self) -> float:
+        """γ."""
+        return self.time_axis.gamma
+
+    def decompose(self, observations: Any) -> RewardDecomposition:
+        """Returns the components `[B, A, N+1]`."""
+        flat = self.network(observations)
+        shape = len(flat), self.about.num_actions or 1, self.time_axis.num_components
+        return RewardDecomposition(flat.reshape(shape), self.time_axis)
+
+    def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
+        """Returns 1 for the action of largest Σ components `[B, A]`; nothing is remembered."""
+        return Greedy(self).act(observations, state, begins)
+
+
 Scores = Callable[[Any, Any, BoolArray], tuple[FloatArray, Any]]
 """From observations, what is remembered and where episodes begin to logits `[B, A]` and memory."""
 
@@ -213,6 +261,10 @@ class Drawing:
         """Returns the probabilities `[B, A]`, and what to remember."""
         logits, state = self.scores(observations, state, begins)
         return softmax(logits), state
+
+
+Found = Drawing | Valuing | Student
+"""What the agent in a file becomes."""
 
 
 def critic_of(told: Scores) -> StateValues:

@@ -19,11 +19,11 @@ from trdlab.policies.networks import (
     sizes,
 )
 
-_CONVOLUTIONS = ("network.0", "network.2", "network.4")
+CONVOLUTIONS = ("network.0", "network.2", "network.4")
 _STRIDES = (4, 2, 1)
 _SCREEN = (84, 84)
 _BYTES = 255.0
-_GAMMA = 0.99  # of these scripts; the files do not say it
+GAMMA = 0.99  # of these scripts; the files do not say it
 
 
 def adapt(file: AgentFile, options: Options) -> Drawing | Valuing | None:
@@ -34,14 +34,14 @@ def adapt(file: AgentFile, options: Options) -> Drawing | Valuing | None:
     """
     weights = file.weights
     layers = {name.rpartition(".")[0] for name in weights}
-    if layers == {*_CONVOLUTIONS, "network.7", "network.9"}:
+    if layers == {*CONVOLUTIONS, "network.7", "network.9"}:
         head = dense(weights, ["network.7", "network.9"], nn.ReLU)
-        network = _of_games(weights, head)
+        network = of_games(weights, head)
         about = _about("DQN", network, len(weights["network.9.weight"]), "ReLU", draws=False)
         return Valuing(about, network)
-    if layers == {*_CONVOLUTIONS, "network.7", "actor", "critic"}:
+    if layers == {*CONVOLUTIONS, "network.7", "actor", "critic"}:
         network, critic = (
-            _of_games(weights, dense(weights, ["network.7", head], nn.ReLU))
+            of_games(weights, dense(weights, ["network.7", head], nn.ReLU))
             for head in ("actor", "critic")
         )
         about = _about("PPO", network, len(weights["actor.weight"]), "ReLU")
@@ -58,9 +58,9 @@ def adapt(file: AgentFile, options: Options) -> Drawing | Valuing | None:
     return None
 
 
-def _of_games(weights: Weights, head: nn.Sequential) -> Network:
+def of_games(weights: Weights, head: nn.Sequential) -> Network:
     """Returns the network of a script for Atari games, which sees stacks of frames."""
-    before = convolutions(weights, _CONVOLUTIONS, _STRIDES)
+    before = convolutions(weights, CONVOLUTIONS, _STRIDES)
     stack = weights["network.0.weight"].shape[1]
     return Network(nn.Sequential(before, head), (stack, *_SCREEN), _BYTES)
 
@@ -73,7 +73,7 @@ def _about(algorithm: str, network: Network, count: int, between: str, draws: bo
         num_actions=count,
         layers=sizes(network.layers),
         activation=between,
-        gamma=_GAMMA,
+        gamma=GAMMA,
         draws=draws,
     )
 

@@ -16,9 +16,9 @@ from trdlab.errors import InputError, closest
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from trdlab.policies.adapted import Drawing, Valuing
+    from trdlab.policies.adapted import Found
 
-    Adapter = Callable[["AgentFile", "Options"], Drawing | Valuing | None]
+    Adapter = Callable[["AgentFile", "Options"], Found | None]
 
 _AGAIN = "Save the model again: model.save(…)."
 _VERSION = "_stable_baselines3_version"
@@ -34,11 +34,15 @@ class Options:
         greedy: whether to take the likeliest action rather than draw one; by default as the
             algorithm does, and the best of what plain layers say.
         normalize: a file that `VecNormalize.save` wrote, where the agent was trained with that.
+        N: the explicit components of each action of a TRD-DQN in flax's format.
+        w: the steps in each of them.
     """
 
     activation: str | None = None
     greedy: bool | None = None
     normalize: str | None = None
+    N: int | None = None
+    w: int | None = None
 
     @classmethod
     def of(cls, arguments: Mapping[str, Any]) -> "Options":
@@ -58,6 +62,8 @@ class Options:
             (options.greedy, bool, "It must be true or false."),
             (options.activation, str, "Give the name of one, such as tanh."),
             (options.normalize, str, "Name a file."),
+            (options.N, int, "It must be a whole number."),
+            (options.w, int, "It must be a whole number."),
         ):
             if value is not None and not isinstance(value, kind):
                 raise InputError(f"An agent's file was given the argument '{value}'.", cure)
@@ -74,12 +80,15 @@ class AgentFile:
         data: what stands beside them in an archive of Stable-Baselines3, as plain data; None where
             it is none.
         version: of the library that wrote such an archive.
+        num_actions: tells how many actions there are where its agent acts; None if that is not
+            known.
     """
 
     path: Path
     weights: Mapping[str, npt.NDArray[Any]]
     data: Mapping[str, Any] | None = None
     version: str = ""
+    num_actions: "Callable[[], int | None]" = lambda: None
 
 
 def is_text(path: Path) -> bool:

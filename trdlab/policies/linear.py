@@ -29,8 +29,9 @@ def adapt(file: AgentFile, options: Options) -> Drawing | Valuing | None:
         raise InputError(
             f"'{file.path}' has '{odd}' of shape {file.weights[odd].shape}: nobody who is known "
             "here writes such weights.",
-            "Known are archives of Stable-Baselines3, CleanRL's dqn_atari, ppo_atari and ppo, and "
-            "linear layers. Or give trdlab.agent a function from observations to probabilities.",
+            "Known are archives of Stable-Baselines3, weights of CleanRL, baby-a3c, ACKTR and the "
+            "paper's authors, and linear layers. Or give trdlab.agent a function from observations "
+            "to probabilities.",
         )
     between = activation(options.activation or "ReLU")
     layers = dense(file.weights, names, between)

@@ -94,19 +94,27 @@ def flow(layers: nn.Sequential) -> tuple[int, int]:
     return linear[0].in_features, linear[-1].out_features
 
 
-def convolutions(weights: Weights, names: Sequence[str], strides: Sequence[int]) -> nn.Sequential:
-    """Returns convolutions, each followed by ReLU, and then all in a row.
+def convolutions(
+    weights: Weights,
+    names: Sequence[str],
+    strides: Sequence[int],
+    between: type[nn.Module] = nn.ReLU,
+    padding: int = 0,
+) -> nn.Sequential:
+    """Returns convolutions, each followed by an activation, and then all in a row.
 
     Args:
         weights: by name.
         names: of the layers.
         strides: of each.
+        between: the activation.
+        padding: how many zeros stand around what each of them sees.
 
     Raises:
         InputError: there are more or fewer, or they are none.
     """
     kernels = [_weight(weights, name) for name in names]
-    if len(names) != len(strides) or any(kernel.ndim != 4 for kernel in kernels):
+    if len(names) != len(strides) or any(of.ndim != 4 or not of.size for of in kernels):
         raise InputError(
             f"There are {len(names)} layers for images, of shapes "
             f"{', '.join(str(kernel.shape) for kernel in kernels)}.",
@@ -117,8 +125,8 @@ def convolutions(weights: Weights, names: Sequence[str], strides: Sequence[int])
         out, into, height, width = kernel.shape
         biased = f"{name}.bias" in weights
         size = (height, width)
-        convolution = nn.Conv2d(into, out, size, stride, bias=biased, device=_NOWHERE)
-        layers += [_filled(convolution, weights, f"{name}."), nn.ReLU()]
+        convolution = nn.Conv2d(into, out, size, stride, padding, bias=biased, device=_NOWHERE)
+        layers += [_filled(convolution, weights, f"{name}."), between()]
     return nn.Sequential(*layers, nn.Flatten())
 
 
@@ -135,6 +143,20 @@ def lstm(weights: Weights, prefix: str) -> nn.LSTM:
     filled: nn.LSTM = _filled(
         nn.LSTM(gates.shape[1], len(gates) // 4, count, device=_NOWHERE), weights, prefix
     )
+    return filled
+
+
+def gru(weights: Weights, prefix: str) -> nn.GRU:
+    """Returns the GRU of one layer whose weights have names that begin so.
+
+    Raises:
+        InputError: a tensor of it is missing, or has another shape.
+    """
+    gates = weights.get(f"{prefix}weight_ih_l0")  # [3·hidden, inputs]
+    if gates is None or gates.ndim != 2 or len(gates) < 3:
+        raise InputError(f"The weights '{prefix}weight_ih_l0' are no GRU's.", _AGAIN)
+    empty = nn.GRU(gates.shape[1], len(gates) // 3, device=_NOWHERE)
+    filled: nn.GRU = _filled(empty, weights, prefix)
     return filled
 
 
@@ -174,18 +196,18 @@ class Network:
 
 @dataclass(frozen=True, eq=False)
 class Recurrent:
-    """A network with an LSTM in its middle, asked in numpy.
+    """A network with an LSTM or a GRU in its middle, asked in numpy.
 
-    What it remembers is a pair of arrays `[B, layers, hidden]`, and zero where episodes begin.
+    What it remembers is zero where episodes begin: `[B, layers, hidden]`, of an LSTM two of those.
 
     Args:
-        before: makes of observations what the LSTM takes.
-        memory: the LSTM.
+        before: makes of observations what the memory takes.
+        memory: the LSTM or GRU.
         after: makes of what it gives the logits.
     """
 
     before: Network
-    memory: nn.LSTM
+    memory: nn.LSTM | nn.GRU
     after: nn.Module
 
     @torch.no_grad()
@@ -194,14 +216,16 @@ class Recurrent:
         features = self.before.layers(self.before.tensor(observations))  # [B, inputs]
         shape = (len(begins), self.memory.num_layers, self.memory.hidden_size)
         blank = np.zeros(shape, dtype=np.float32)
-        held = (blank, blank) if state is None else state
-        now = [
-            torch.from_numpy(np.where(begins[:, None, None], 0, part)).transpose(0, 1)
+        is_pair = isinstance(self.memory, nn.LSTM)
+        held = (blank,) * (1 + is_pair) if state is None else state
+        now = tuple(
+            torch.from_numpy(np.where(begins[:, None, None], 0, part)).transpose(0, 1).contiguous()
             for part in held
-        ]
-        told, then = self.memory(features[None], tuple(part.contiguous() for part in now))
+        )
+        told, then = self.memory(features[None], now if is_pair else now[0])
         logits = np.asarray(self.after(told[0]).numpy())
-        return logits, tuple(part.transpose(0, 1).contiguous().numpy() for part in then)
+        parts = then if is_pair else (then,)
+        return logits, tuple(part.transpose(0, 1).contiguous().numpy() for part in parts)
 
 
 class Combined(nn.Module):
@@ -244,10 +268,9 @@ def sizes(*parts: nn.Module) -> str:
         if isinstance(layer, nn.Conv2d):
             height, width = layer.kernel_size
             words += [f"{layer.out_channels} of {height}×{width}"]
-        elif isinstance(layer, nn.LSTM):
-            words += [
-                f"LSTM {layer.hidden_size}" + f" ×{layer.num_layers}" * (layer.num_layers > 1)
-            ]
+        elif isinstance(layer, nn.LSTM | nn.GRU):
+            deep = f" ×{layer.num_layers}" * (layer.num_layers > 1)
+            words += [f"{layer.mode} {layer.hidden_size}{deep}"]
         elif isinstance(layer, nn.Linear):
             words += [str(layer.in_features)] * (not words) + [str(layer.out_features)]
     return " → ".join(words)

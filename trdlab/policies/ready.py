@@ -81,6 +81,12 @@ class EpsilonGreedy:
     policy: Policy
     epsilon: float
 
+    @property
+    def about(self) -> Any:
+        """What is known about the other one (`About`), if anything is."""
+        about = getattr(self.policy, "about", None)
+        return about and replace(about, draws=True)
+
     def __post_init__(self) -> None:
         if not 0.0 <= self.epsilon <= 1.0:
             raise InputError(f"ε is {self.epsilon}.", "It must be in [0, 1].")

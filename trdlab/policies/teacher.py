@@ -48,7 +48,13 @@ class Teacher:
     temperature: float = 1.0
     by_values: bool = False
 
-    def ask(self, observations: Any, state: Any, begins: BoolArray) -> tuple[Lesson, Any]:
+    def ask(
+        self,
+        observations: Any,
+        state: Any,
+        begins: BoolArray,
+        allowed: BoolArray | None = None,
+    ) -> tuple[Lesson, Any]:
         """Returns what it says, and what it remembers; see `Policy.act` for the arguments.
 
         Raises:
@@ -56,8 +62,8 @@ class Teacher:
         """
         if self.by_values and self.values is not None:
             values = self.values(observations)  # [B, A]
-            return Lesson(greedy(values), softmax(values / self.temperature)), None
-        likely, state = ask(self.policy, observations, state, begins)
+            return Lesson(greedy(values, allowed), softmax(values / self.temperature)), None
+        likely, state = ask(self.policy, observations, state, begins, allowed)
         return Lesson(likely, evened(likely, self.temperature)), state
 
 

@@ -16,6 +16,7 @@ from safetensors.torch import load_file
 from torch import Tensor
 
 from trdlab.errors import InputError
+from trdlab.policies.flax import is_flax, read_flax
 
 _HELD_UNDER = ("state_dict", "model_state_dict", "q_network", "network", "model", "weights")
 
@@ -24,8 +25,9 @@ def read_weights(path: str | Path) -> dict[str, npt.NDArray[Any]]:
     """Returns the weights that a file holds, by name; floating-point ones as float32.
 
     Args:
-        path: a safetensors file, or a state dict as `torch.save` writes it; also a mapping that
-            has a state dict under `state_dict`, `model_state_dict`, `q_network`, `network`,
+        path: a safetensors file, or a state dict as `torch.save` writes it; a list of tensors, by
+            their numbers; what flax writes (`to_bytes`), with points in its names; also a mapping
+            that has a state dict under `state_dict`, `model_state_dict`, `q_network`, `network`,
             `model` or `weights`. What it is follows from what it holds, not from its name.
 
     Raises:
@@ -33,7 +35,7 @@ def read_weights(path: str | Path) -> dict[str, npt.NDArray[Any]]:
             pickle with code is refused, and the code is not executed.
     """
     path = Path(path)
-    return weights_in(lambda: load_file(path) if _is_safetensors(path) else _unpickled(path), path)
+    return weights_in(lambda: _read(path), path)
 
 
 def read_part(part: bytes, called: str) -> dict[str, npt.NDArray[Any]]:
@@ -61,6 +63,8 @@ def weights_in(read: Callable[[], Any], called: str | Path) -> dict[str, npt.NDA
     """
     try:
         held = read()
+    except InputError:
+        raise
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"'{called}' cannot be read: {reason}.", "Name another file.") from error
@@ -85,6 +89,14 @@ def weights_in(read: Callable[[], Any], called: str | Path) -> dict[str, npt.NDA
     return weights
 
 
+def _read(path: Path) -> Any:
+    if _is_safetensors(path):
+        return load_file(path)
+    if is_flax(path):
+        return {name: torch.from_numpy(array) for name, array in read_flax(path).items()}
+    return _unpickled(path)
+
+
 def _is_safetensors(path: Path) -> bool:
     """Returns whether a file begins as safetensors do: a length, and then a header in JSON."""
     with path.open("rb") as file:
@@ -100,6 +112,8 @@ def _unpickled(file: Path | BytesIO) -> Any:
 
 def _state_dict(held: Any, called: str | Path) -> Mapping[str, Tensor]:
     """Returns the weights by name, wherever they stand in what a file holds."""
+    if isinstance(held, list):
+        held = {str(number): part for number, part in enumerate(held)}
     inner = [held.get(key) for key in _HELD_UNDER] if isinstance(held, Mapping) else []
     for found in (held, *inner):
         if isinstance(found, Mapping) and found and all(map(_is_weight, found.items())):

@@ -114,6 +114,7 @@ class Recording:
         first = self.playing.stack.observations  # [B, ...]
         self._states = [[state] for state in first] if first.ndim == 1 else []
         self._last = np.zeros((count, estimator.time_axis.num_components))
+        self._policy = policy
         self._critic: StateValues | None = getattr(policy, "state_values", None)
         self._memory, self._asked = None, np.arange(count)  # of the critic, and whose it is
 
@@ -167,10 +168,10 @@ class Recording:
     def _criticise(self, likely: FloatArray) -> FloatArray:
         """Returns what the critic says of the episodes that go on `[B]`; of no critic, NaN."""
         playing, values = self.playing, np.full(len(self._logs), np.nan)
-        if self._critic is not None:
+        if self._critic is not None and self._policy is not None:
             memory = rows(self._memory, playing.running[self._asked])
             self._asked = np.flatnonzero(playing.running)
-            seen, begins = playing.stack.observations[playing.running], playing.steps == 0
+            seen, begins = playing.shown(self._policy), playing.steps == 0
             asked = seen, memory, np.full(len(self._asked), begins), likely
             values[self._asked], self._memory = self._critic(*asked)
         return values

@@ -15,6 +15,7 @@ from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator
 from trdlab.policies import Policy, ask, greedy, rows
+from trdlab.policies.adapted import sees_screens
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,7 @@ class Playing:
         self._decision: Decision | None = None
         self._turn: Turn | None = None
         self._last: Any = None
+        self._last_shown: Any = None
         self._last_allowed: BoolArray | None = None
 
     @property
@@ -154,15 +156,24 @@ class Playing:
         allowed: BoolArray | None = getattr(self.environments, "allowed", None)
         return allowed
 
+    def shown(self, policy: Policy) -> Any:
+        """Returns what a policy looks at where R episodes go on `[R, ...]`.
+
+        That is what is seen; or whole screens, if it says so (see `About`).
+
+        Raises:
+            InputError: the environments do not show whole screens.
+        """
+        return shown(policy, self.environments, self.stack)[self.running]
+
     def decide(self) -> Decision:
         """Returns what is expected where R episodes go on, and how likely each action is."""
         if self._decision is None:
-            seen = self.stack.observations[self.running]
-            told = self._told(seen)
+            told = self._told(self.stack.observations[self.running])
             likely = (
                 greedy(told.value, _of(self.allowed, self.running))
                 if self._policy is None
-                else self._ask(self._policy, seen)
+                else self._ask(self._policy)
             )
             self._decision = Decision(told, likely)
         return self._decision
@@ -171,7 +182,7 @@ class Playing:
         """Returns what is done at this step."""
         if self._turn is None:
             if self._estimator is None and self._policy is not None:
-                likely = self._ask(self._policy, self.stack.observations[self.running])
+                likely = self._ask(self._policy)
             else:
                 likely = self.decide().probabilities  # [R, A]
             count = len(self.running)
@@ -207,7 +218,9 @@ class Playing:
         else:
             self.running, self.ages = self.running & ~over, ages
         self.stack.push(step.frames)  # where episodes end, their last ones
-        self._last = self.stack.observations[self.finished]
+        self._last = self._last_shown = self.stack.observations[self.finished]
+        if sees_screens(self._policy) and step.screens is not None:
+            self._last_shown = step.screens[self.finished]
         self._last_allowed = _of(step.allowed, self.finished)
         self.stack.begin(step.following, ended)
         self._decision, self._turn = None, None
@@ -230,7 +243,8 @@ class Playing:
             raise TypeError("Nobody was given who acts.")
         memory = rows(self._memory, self.finished[self._asked])
         nowhere = np.zeros(len(self._last), dtype=np.bool_)
-        return self._last, ask(self._policy, self._last, memory, nowhere, self._last_allowed)[0]
+        shown, allowed = self._last_shown, self._last_allowed
+        return self._last, ask(self._policy, shown, memory, nowhere, allowed)[0]
 
     def branch(self, which: IntArray, *, rng: np.random.Generator, max_steps: int) -> "Playing":
         """Returns copies of episodes at this step, with what their policy remembers of it.
@@ -266,25 +280,35 @@ class Playing:
             raise TypeError("Nobody was given who expects anything.")
         return self._estimator.decompose(observations)
 
-    def _ask(self, policy: Policy, observations: Any) -> FloatArray:
+    def _ask(self, policy: Policy) -> FloatArray:
         """Returns how likely the policy takes each action `[R, A]`, and lets it remember."""
         memory = rows(self._memory, self.running[self._asked])
         self._asked = np.flatnonzero(self.running)
         begins = self.ages[self._asked] == 0
         allowed = _of(self.allowed, self.running)
-        likely, self._memory = ask(policy, observations, memory, begins, allowed)
+        likely, self._memory = ask(policy, self.shown(policy), memory, begins, allowed)
         return likely
 
 
 def shown(policy: Any, environments: Environments, stack: FrameStack) -> Any:
-    """Returns what a policy looks at in environments `[B, ...]`: what is seen there.
+    """Returns what a policy looks at in environments `[B, ...]`.
 
     Args:
         policy: who looks.
         environments: where.
-        stack: what is seen.
+        stack: what is seen there.
+
+    Raises:
+        InputError: they do not show the whole screens that it looks at.
     """
-    return stack.observations
+    if not sees_screens(policy):
+        return stack.observations
+    if (screens := getattr(environments, "screens", None)) is None:
+        raise InputError(
+            "The policy looks at whole screens, and they are not shown here.",
+            "Name an Atari game, and make it with screens=true.",
+        )
+    return screens
 
 
 def any_actions(

@@ -3,6 +3,7 @@
 from rich.text import Text
 
 from trdlab.agents.agent import Agent
+from trdlab.policies.adapted import About, sees_screens
 from trdlab.show.tables import Table
 from trdlab.show.text import columns, table_lines
 
@@ -20,10 +21,10 @@ def agent_page(agent: Agent, how: str, *, width: int | None = None) -> Text:
         how: it chooses its actions: `greedy` or `sampled`.
         width: of the page; by default that of the terminal.
     """
-    about, there = getattr(agent.policy, "about", None), agent.interface
+    about, there = getattr(agent.policy or agent.estimator, "about", None), agent.interface
     rows = [
         ("agent", about.title if about else agent.name),
-        ("sees", there.seen),
+        ("sees", _seen(agent)),
         ("does", there.done),
         ("network", ", ".join(filter(None, (about.layers, about.activation))) if about else ""),
         ("memory", f"{about.memory} numbers" if about and about.memory else ""),
@@ -33,3 +34,12 @@ def agent_page(agent: Agent, how: str, *, width: int | None = None) -> Text:
     ]
     told = tuple(row for row in rows if row[1])
     return Text("\n").join(table_lines(Table(("", ""), told, "<<"), width or columns()))
+
+
+def _seen(agent: Agent) -> str:
+    """Returns what an agent looks at, and what a fit of it does if that is something else."""
+    about: About | None = getattr(agent.policy, "about", None)
+    if about is None or not sees_screens(agent.policy):
+        return agent.interface.seen
+    screen = "×".join(map(str, about.seen or ()))
+    return f"the whole screen in colour, {screen}; a fit sees {agent.interface.seen}"

@@ -268,10 +268,10 @@ def _trainer(
 ) -> tuple[Trainer, int]:
     """Returns a trainer at its beginning, and the bytes that its replay memory will take."""
     check_board(wanted=settings.tensorboard)
-    environments = teacher.make(settings) if teacher else make_environments(settings)
-    stack.callback(environments.close)
     if teacher is not None:
         settings = teacher.settled(settings)
+    environments = teacher.make(settings) if teacher else make_environments(settings)
+    stack.callback(environments.close)
     settings = resolved(settings, environments)
     taught = None
     if teacher is not None:

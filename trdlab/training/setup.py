@@ -111,9 +111,10 @@ def _made(settings: TrainSettings, num_envs: int | None, seed: int | None) -> En
     count = settings.num_envs if num_envs is None else num_envs
     seed = settings.seed if seed is None else seed
     if settings.kind == "atari":
-        from trdlab.atari import AtariEnvironments
+        from trdlab.atari import AtariEnvironments, GreyAndColour
 
-        return AtariEnvironments(settings.env, count, seed=seed, **_for_atari(arguments))
+        made = GreyAndColour if arguments.pop("screens", False) else AtariEnvironments
+        return made(settings.env, count, seed=seed, **_for_atari(arguments))
     from trdlab.environments import GymEnvironments
 
     return GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments)
@@ -189,10 +190,10 @@ def plan(settings: TrainSettings, find: "FindTeacher | None" = None) -> Plan:
 
     check_threads(settings)
     candidate = find(settings) if find and settings.teacher else None
+    if candidate is not None:
+        settings = candidate.settled(settings)
     environments = candidate.make(settings) if candidate else make_environments(settings)
     try:
-        if candidate is not None:
-            settings = candidate.settled(settings)
         settings = resolved(settings, environments)
         warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
         begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)

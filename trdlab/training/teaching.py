@@ -40,6 +40,7 @@ class Candidate:
         values: from observations `[B, ...]` to the value of each action `[B, A]`, where it acts by
             them; else None.
         on_scale: whether these count as the student does: with its γ, and its rewards.
+        needs: how the game is to be played for it, and so for the student, too; as `KEY=VALUE`.
         beside: what the student's environments are to be made with beside their own arguments, so
             that they show what this agent looks at; as `KEY=VALUE`.
     """
@@ -49,10 +50,12 @@ class Candidate:
     policy: Policy
     values: Callable[[Any], FloatArray] | None
     on_scale: bool
+    needs: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
 
     def settled(self, settings: TrainSettings) -> TrainSettings:
-        """Returns the settings with what `auto` stands for with this teacher."""
+        """Returns the settings with what `auto` stands for with this teacher, and what it needs."""
+        settings = replace(settings, env_arg=(*settings.env_arg, *self.needs))
         by_values = self.values is not None and self.on_scale
         if settings.distil != "auto":
             return settings

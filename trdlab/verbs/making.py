@@ -40,7 +40,7 @@ def agent(
             `gridworld:drone`, a map file or `tabular:FrozenLake-v1`, for the exact table of a
             model; a gridworld or another model; a table that is solved already; any `Estimator`,
             such as one of your own; or an agent. Of others, who know nothing of their future until
-            they are fitted: a file of Stable-Baselines3 or CleanRL, a loaded model, a `Policy`, or
+            they are fitted: a file of an agent that others trained, a loaded model, a `Policy`, or
             a function from an observation to an action's number, or from observations to
             probabilities.
         env: where it acts, if that is not where it was made for: a Gymnasium id, an environment, a

@@ -206,7 +206,8 @@ def _played(
             turn, likely = playing.turn(), None
             if other is not None:
                 begins = np.array([at == 0])
-                likely, memory = ask(other, observation, memory, begins, playing.allowed)
+                seen_by = playing.shown(other)
+                likely, memory = ask(other, seen_by, memory, begins, playing.allowed)
             told = (turn.probabilities, likely)[:: 1 if player == 0 else -1]
             allowed = None if playing.allowed is None else playing.allowed.copy()
             seen = _Seen(player, seed, at, observation[0], told, allowed)

@@ -108,7 +108,7 @@ PRESETS["gym"] |= {
     "lunar-lander": (
         "for LunarLander, whose single rewards are large",
         {
-            "agent_steps": 200_000,
+            "agent_steps": 300_000,
             "num_envs": 8,
             "learning_starts": 2_000,
             "gamma": 0.98,  # to hover for another step must cost more than the network errs by

@@ -26,7 +26,7 @@ from trdlab.agents import find_agent
 from trdlab.cli import main
 from trdlab.cli.options import flag
 from trdlab.cli.progress import EpisodeProgress, TrainingProgress, stopping
-from trdlab.deep.presets import PRESETS, preset
+from trdlab.deep.presets import PRESETS, preset, with_teacher
 from trdlab.rollouts.playing import Progress
 from trdlab.runs import RunFolder, checkpoint_steps
 from trdlab.training.loading import load
@@ -88,10 +88,11 @@ def test_the_help_has_every_setting_under_its_heading(trdlab, kind):
     panels = re.split(r"╭─ (.+?) ─+╮", out)
     shown = dict(zip(panels[1::2], panels[2::2], strict=True))
     assert list(shown) == [
-        "Arguments", "Options", "Run", "Time axis", "Acting", "Learning", "Reward and ending",
-        "Evaluation", "Running",
+        "Arguments", "Options", "Run", "Time axis", "Acting", "Learning", "Learning from a teacher",
+        "Reward and ending", "Evaluation", "Running",
     ]  # fmt: skip
-    keys = [*preset(kind, "X").to_config(), "learning_rate_end", "max_grad_norm", "weights"]
+    taught = preset(kind, "X").changed({"teacher": "ppo.zip"}).to_config()
+    keys = [*taught, "learning_rate_end", "max_grad_norm", "weights"]
     for key in keys[2:]:
         assert re.search(rf"{flag(key)}\b", out), key
     assert "--w " in shown["Time axis"]
@@ -101,6 +102,8 @@ def test_the_help_has_every_setting_under_its_heading(trdlab, kind):
     for name, (about, lines) in PRESETS[kind].items():
         assert f"{name}: {about}" in told
         assert all(key in keys for key in lines)
+    steps = with_teacher(kind, preset(kind, "X"))["teacher_steps"]
+    assert f"of all environments. [default: ({steps})]" in told
     horizon = preset(kind, "X").horizon
     about = rf"Number of explicit components; 0 is DQN\. \[default: \({horizon}\)\]"
     assert re.search(rf"--N (<int>|INTEGER) {about}", told)  # which of them, Typer decides
@@ -496,8 +499,8 @@ def test_pictures_need_no_backend_of_a_notebook(tmp_path, trained, words, monkey
 # ---- progress and signals ------------------------------------------------------------------------
 
 
-def steps(count: int) -> Any:
-    return SimpleNamespace(agent_steps=count)
+def steps(count: int, total: int = 100_000, what: str = "steps", clock: int = 0) -> Any:
+    return SimpleNamespace(standing=(count, total, what), clock=clock or count)
 
 
 def metrics(score: float | None, loss: float | None) -> Any:
@@ -521,6 +524,23 @@ def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
     ]
 
 
+def test_each_phase_counts_what_it_does_and_has_its_own_speed(monkeypatch):
+    now = [1000.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    console = Console(file=io.StringIO(), width=80)
+    with TrainingProgress(console, total=1_600) as progress:
+        for done, what, clock in ((100, "offline updates", 600), (300, "offline updates", 800)):
+            now[0] += 20.0
+            progress.on_step(steps(done, 400, what, clock))
+        now[0] += 20.0
+        progress.on_step(steps(100, 700, "steps", 1_000))
+    assert console.file.getvalue().splitlines() == [  # type: ignore[attr-defined]
+        "100 of 400 offline updates, score –, loss –",
+        "300 of 400 offline updates, 10/s, score –, loss –",
+        "100 of 700 steps, score –, loss –",
+    ]
+
+
 def test_episodes_are_told_of_in_a_pipe_too(monkeypatch):
     now = [1000.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
@@ -539,7 +559,7 @@ def test_on_a_terminal_there_is_a_bar():
     console = Console(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
     with TrainingProgress(console, total=1000) as progress:
         progress.on_metrics(metrics(-20.5, None))
-        progress.on_step(steps(500))
+        progress.on_step(steps(500, 1000))
     shown = console.file.getvalue()  # type: ignore[attr-defined]
     assert "500 of 1,000 steps" in shown
     assert "score -20.5, loss –" in shown

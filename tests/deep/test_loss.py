@@ -7,7 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import nn
 
-from trdlab.deep.loss import finite_loss, greedy_actions, td_loss, trd_target
+from trdlab.deep.loss import (
+    acted,
+    distillation_loss,
+    finite_loss,
+    greedy_actions,
+    td_loss,
+    trd_target,
+)
 from trdlab.errors import InputError, TrdlabError
 
 
@@ -32,6 +39,43 @@ def test_double_dqn_chooses_with_one_network_and_reads_the_other():
     chooser = torch.tensor([[[9.0, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0, 9]]])
     target = trd_target(REWARD, DISCOUNT, FOLLOWING, selected_by=chooser)
     assert target.tolist() == [[1, 0.5, 2.5], [-1, 0.25, 0.5]]
+
+
+def test_the_target_of_a_given_policy_by_hand():
+    policy = torch.tensor([[0.5, 0.5], [0.0, 1.0]])
+    target = trd_target(REWARD, DISCOUNT, FOLLOWING, policy=policy)
+    assert target.tolist() == [[1, 0.25, 3], [-1, 0.25, 0.5]]
+
+
+def test_a_policy_head_draws_or_takes_the_likeliest():
+    logits = torch.log(torch.tensor([[1.0, 3.0], [2.0, 2.0]]))
+    torch.testing.assert_close(acted(logits, draw=True), torch.tensor([[0.25, 0.75], [0.5, 0.5]]))
+    assert acted(logits, draw=False).tolist() == [[0, 1], [1, 0]]  # of equals the first
+
+
+# ---- distillation --------------------------------------------------------------------------------
+
+
+def test_the_distance_from_a_teacher_by_hand():
+    logits = torch.log(torch.tensor([[0.5, 0.5], [0.25, 0.75]]))
+    taught = torch.tensor([[1.0, 0.0], [0.5, 0.5]])
+    one, other = np.log(2), 0.5 * np.log(0.5 / 0.25) + 0.5 * np.log(0.5 / 0.75)
+    assert distillation_loss(logits, taught).item() == pytest.approx((one + other) / 2)
+
+
+def test_where_student_and_teacher_agree_there_is_neither_distance_nor_gradient():
+    taught = torch.tensor([[0.25, 0.75]])
+    logits = (taught.log() + 3.0).requires_grad_()  # logits have no level
+    distance = distillation_loss(logits, taught)
+    distance.backward()
+    assert abs(distance.item()) < 1e-7
+    assert logits.grad.abs().max() < 1e-7
+
+
+def test_going_down_the_gradient_does_more_often_what_the_teacher_does():
+    logits = torch.zeros(1, 3, requires_grad=True)
+    distillation_loss(logits, torch.tensor([[0.7, 0.2, 0.1]])).backward()
+    np.testing.assert_allclose(logits.grad, [[1 / 3 - 0.7, 1 / 3 - 0.2, 1 / 3 - 0.1]], atol=1e-6)
 
 
 def test_of_tied_actions_the_first_is_taken():

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from trdlab.deep.presets import DEFAULT_PRESETS, PRESETS, preset, preset_line
-from trdlab.deep.settings import TrainSettings, UpdateSettings
+from trdlab.deep.settings import TEACHING, TrainSettings, UpdateSettings
 from trdlab.errors import InputError
 
 GYM = TrainSettings("gym", "CartPole-v1")
@@ -47,11 +47,45 @@ def test_settings_come_back_from_their_configuration(config):
 def test_what_is_not_said_has_the_default_and_what_is_not_set_is_not_told():
     told = GYM.to_config()
     assert (told["N"], told["w"], told["hidden"]) == (10, 1, [128, 128])
-    assert {of.metadata.get("key") or of.name for of in fields(TrainSettings)} - told.keys() == {
-        "learning_rate_end",
-        "max_grad_norm",
-        "weights",
-    }
+    unset = {"learning_rate_end", "max_grad_norm", "weights"}
+    keys = {of.metadata.get("key") or of.name for of in fields(TrainSettings)}
+    of_teacher = {of.name for of in fields(TrainSettings) if of.metadata.get("panel") == TEACHING}
+    assert keys - told.keys() == unset | of_teacher
+    assert keys - GYM.changed({"teacher": "ppo.zip"}).to_config().keys() == unset
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ({"teacher_steps": 5}, "`teacher_steps` is for learning from a teacher. Name one."),
+        ({"draw": True}, "`draw` is for learning from a teacher. Name one."),
+        (
+            {"teacher": "a", "teacher_steps": 31},
+            "`teacher_steps` is 31: too few for 5000 `offline_updates` in batches. Choose 32 or "
+            "more, or no offline updates.",
+        ),
+        (
+            {"teacher": "a", "offline_updates": 0},
+            "`offline_updates` is 0: nothing would learn from 20000 steps of the teacher. Choose "
+            "more, or set `teacher_steps` to 0, too.",
+        ),
+        (
+            {"teacher": "a", "distil": "all"},
+            "`distil` is 'all'. Use one of: auto, values, policy.",
+        ),
+        ({"teacher": "a", "temperature": 0.0}, "The temperature is 0.0. Choose one above 0."),
+    ],
+)
+def test_what_does_not_go_together_with_a_teacher(lines, message):
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        GYM.changed(lines)
+
+
+def test_with_a_teacher_nothing_begins_at_random():
+    alone, taught = GYM, GYM.changed({"teacher": "a", "epsilon_start": 0.25})
+    assert alone.epsilon(0) == 1.0
+    assert taught.epsilon(0) == 0.25
+    assert (alone.clock_end, taught.clock_end) == (100_000, 125_000)
 
 
 def test_whole_numbers_may_be_written_like_1e6():

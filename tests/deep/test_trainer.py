@@ -229,7 +229,9 @@ def test_the_learning_rate_of_an_update_is_that_of_its_moment():
 def test_the_loss_told_is_the_mean_since_the_line_before(monkeypatch):
     trainer, made = scripted(), []
     update = trainer.learner.update
-    monkeypatch.setattr(trainer.learner, "update", lambda of: made.append(update(of)) or made[-1])
+    monkeypatch.setattr(
+        trainer.learner, "update", lambda of, **_: made.append(update(of)) or made[-1]
+    )
     for _ in range(10):
         trainer.step()
     assert trainer.metrics().loss is None

@@ -7,8 +7,8 @@ import torch
 from torch import nn
 
 from trdlab.decomposition import TimeAxis
-from trdlab.deep.estimator import NetworkEstimator
-from trdlab.deep.networks import build_network
+from trdlab.deep.estimator import ActingEstimator, NetworkEstimator
+from trdlab.deep.networks import DecompositionNetwork, build_network
 from trdlab.deep.settings import UpdateSettings
 from trdlab.deep.update import Batch, Learner
 from trdlab.errors import InputError, TrdlabError
@@ -77,6 +77,70 @@ def test_the_whole_drone_is_learned_exactly(reduction):
     truth = exact(mdp, AXIS).decomposition
     error = np.abs(learned.decompose(np.arange(mdp.num_states)).components - truth.components)
     assert error.max() <= 0.02, error.max(axis=(0, 1))
+
+
+def test_the_future_of_a_policy_head_is_learned_exactly():
+    """A head that chooses evenly, in the drone: the components are those of that policy."""
+    mdp = Gridworld(load_map("drone")).mdp
+    states = np.repeat(np.arange(mdp.num_states), mdp.num_actions)
+    batch = Batch(
+        observations=states,
+        actions=np.tile(np.arange(mdp.num_actions), mdp.num_states),
+        rewards=mdp.rewards,
+        discounts=AXIS.gamma * ~mdp.terminated,
+        next_observations=mdp.next_states,
+    )
+    space = gym.spaces.Discrete(mdp.num_states)
+    network = build_network(space, mdp.num_actions, AXIS, policy_head=True)
+    for weight in network.policy_head.parameters():
+        nn.init.zeros_(weight)
+    settings = UpdateSettings(learning_rate=1e-3, target_sync_updates=20, draw=True)
+    trained = Learner(network, settings)
+    for _ in range(2000):
+        trained.update(batch)
+    learned = ActingEstimator(network, AXIS, Future("the policy head"), draw=True)
+    evenly = np.full(mdp.shape, 1.0 / mdp.num_actions)
+    truth = exact(mdp, AXIS, policy=evenly).decomposition
+    seen = np.arange(mdp.num_states)
+    error = np.abs(learned.decompose(seen).components - truth.components)
+    assert error.max() <= 0.02, error.max(axis=(0, 1))
+    likely, _ = learned.act(seen, None, np.ones(len(seen), dtype=np.bool_))
+    np.testing.assert_array_equal(likely, evenly)
+
+
+def test_a_teacher_moves_the_components_unless_there_is_a_policy_head():
+    """In the first update the head of components has the same gradient with and without it."""
+    batch, taught = random_batch(0), np.tile(np.float32([0.9, 0.1]), (8, 1))
+
+    def after(policy_head: bool, distillation: float) -> DecompositionNetwork:
+        network = build_network(VECTOR, 2, TimeAxis(0.95, 4), hidden=(16,), policy_head=policy_head)
+        told = Learner(network).update(batch, taught=taught, distillation=distillation)
+        assert told.distance > 0
+        return network
+
+    for policy_head in (False, True):
+        alone, both = after(policy_head, 0.0), after(policy_head, 50.0)
+        assert torch.equal(alone.head.weight, both.head.weight) == policy_head
+        assert not torch.equal(alone.body[0].weight, both.body[0].weight)
+
+
+def test_the_teacher_is_come_near_to():
+    batch, taught = random_batch(0), np.tile(np.float32([0.9, 0.1]), (8, 1))
+    for policy_head in (False, True):
+        network = build_network(VECTOR, 2, TimeAxis(0.95, 4), hidden=(16,), policy_head=policy_head)
+        trained = Learner(network, UpdateSettings(learning_rate=1e-2))
+        told = [trained.update(batch, taught=taught, distillation=1e3) for _ in range(200)]
+        assert told[-1].distance < 0.01 < told[0].distance
+        probabilities = network.logits(torch.as_tensor(batch.observations)).softmax(dim=1)
+        np.testing.assert_allclose(probabilities.detach(), taught, atol=0.05)
+
+
+def test_a_learner_of_before_there_were_teachers_goes_on():
+    state = learner().state_dict()
+    before = {k: v for k, v in state["settings"].items() if k not in ("temperature", "draw")}
+    learner().load_state_dict(state | {"settings": before})
+    with pytest.raises(InputError, match=r"temperature 1\.0 there, 2\.0 here"):
+        learner(temperature=2.0).load_state_dict(state | {"settings": before})
 
 
 def test_without_explicit_components_updates_are_those_of_dqn():

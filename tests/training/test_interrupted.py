@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from trdlab.runs import RunFolder, checkpoint_steps, load_checkpoint, read_arrays, read_metrics
+from trdlab.runs.metrics import step_of
 
 STEPS, EVERY, CAPACITY = 400, 40, 96
 ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "COLUMNS": "80"}
@@ -48,6 +49,54 @@ def train(out: Path, num_envs: int) -> list[str]:
     }
     words = ["train", "gym", "trdlab/DroneGridworld-v0"]
     return [*words, *(str(word) for option in options.items() for word in option)]
+
+
+TEACHER = """
+import numpy as np
+
+class Balances:
+    \"\"\"Balances the pole, and remembers where it was; draws its actions.\"\"\"
+
+    def act(self, observations, state, begins):
+        seen = observations
+        before = seen if state is None else np.where(begins[:, None], seen, state[0])
+        falls = seen[:, 2:3] + seen[:, 3:4] + 0.1 * (seen - before)[:, 2:3]
+        right = 1.0 / (1.0 + np.exp(-40.0 * falls))
+        return np.concatenate([1.0 - right, right], axis=1), (np.array(observations), None)
+
+def make():
+    return Balances()
+"""
+COLLECTED, OFFLINE = 160, 80
+
+
+def train_taught(out: Path, num_envs: int, teacher: str) -> list[str]:
+    """Returns the words that begin a run which learns from a teacher with a memory."""
+    options = {
+        "--teacher": teacher,
+        "--teacher-steps": COLLECTED,
+        "--offline-updates": OFFLINE,
+        "--distil": "policy",
+        "--draw": None,
+        "--out": out,
+        "--num-envs": num_envs,
+        "--agent-steps": STEPS - COLLECTED - OFFLINE,
+        "--checkpoint-every": EVERY,
+        "--log-every": 4,
+        "--capacity": CAPACITY,
+        "--N": 2,
+        "--w": 2,
+        "--hidden": 16,
+        "--batch-size": 4,
+        "--update-every": 4,
+        "--learning-starts": 12,
+        "--target-sync-updates": 9,
+        "--epsilon-end": 0.2,
+        "--evaluate-episodes": 0,
+        "--threads": 1,
+    }
+    words = ["train", "gym", "CartPole-v1"]
+    return [*words, *(str(word) for of in options.items() for word in of if word is not None)]
 
 
 class Command:
@@ -125,12 +174,12 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 def has_told(out: Path, steps: int) -> Callable[[], bool]:
-    """Returns whether there is a line of metrics of so many agent steps or more."""
+    """Returns whether there is a line of metrics of that step or a later one."""
     path = out / "metrics.jsonl"
 
     def told() -> bool:
         rows = read_metrics(path) if path.exists() else []
-        return bool(rows) and rows[-1]["agent_steps"] >= steps
+        return bool(rows) and step_of(rows[-1]) >= steps
 
     return told
 
@@ -149,6 +198,9 @@ def differences(a: Any, b: Any, path: str = "") -> list[str]:
     if isinstance(a, dict) and isinstance(b, dict):
         keys = sorted(a.keys() | b.keys())
         return [at for key in keys for at in differences(a.get(key), b.get(key), f"{path}/{key}")]
+    if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        pairs = enumerate(zip(a, b, strict=True))
+        return [at for number, pair in pairs for at in differences(*pair, f"{path}/{number}")]
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         alike = (a.dtype, a.shape, a.tobytes()) == (b.dtype, b.shape, b.tobytes())
         return [] if alike else [path]
@@ -207,6 +259,29 @@ def test_ten_kills_at_random_moments(command, uninterrupted, tmp_path, num_envs)
     assert in_episodes >= 5
     command.to_the_end(words)
     check_same(out, uninterrupted(num_envs))
+
+
+@pytest.mark.parametrize("num_envs", [1, 4])
+def test_kills_in_every_phase_of_learning_from_a_teacher(command, tmp_path, num_envs):
+    (tmp_path / "pole.py").write_text(TEACHER)
+    teacher = f"python:{tmp_path / 'pole.py'}:make"
+    whole, out = tmp_path / "whole", tmp_path / "run"
+    command.to_the_end(train_taught(whole, num_envs, teacher))
+    rng, words, phases = np.random.default_rng(num_envs), train_taught(out, num_envs, teacher), []
+    for moment in (8, 60, 140, 162, 200, 246, 254, 330):
+        command.start(words)
+        wait_until(has_told(out, moment))
+        time.sleep(rng.uniform(0.0, 0.05))
+        command.send(signal.SIGKILL)
+        assert command.code() == -signal.SIGKILL
+        phases.append(read_metrics(out / "metrics.jsonl")[-1]["phase"])
+        words = ["resume", str(out), "--teacher", teacher]
+    assert set(phases) == {"teacher", "offline", "online"}
+    command.to_the_end(words)
+    check_same(out, whole)
+    rows = result(out)[2]  # a phase is over where the next one begins
+    assert [row["phase"] for row in rows] == ["teacher"] * 39 + ["offline"] * 20 + ["online"] * 41
+    assert [step_of(row) for row in rows] == list(range(4, STEPS + 1, 4))
 
 
 def test_a_stopped_run_is_saved_at_that_very_step_and_goes_on_from_there(

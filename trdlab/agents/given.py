@@ -151,7 +151,7 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
                 f"The estimator decomposes an observation of {place.name} into shape {told}.",
                 f"It should be [B, A, N+1] = {wanted}.",
             )
-        return replace(agent, estimator=who)
+        return replace(agent, estimator=who, policy=who if isinstance(who, Policy) else None)
     if not isinstance(who, Policy):
         unflat = found.space.unflat if isinstance(found.space, FlatSpace) else as_they_are
         who = from_function(who, np.repeat(seen, 2, axis=0), count, unflat)

@@ -23,7 +23,7 @@ from trdlab.environments.making import check_imported
 from trdlab.environments.naming import are_own, is_numbered
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
-from trdlab.policies import acting
+from trdlab.policies import Policy, acting
 from trdlab.policies.adapted import About, games_for
 from trdlab.policies.files import Options
 from trdlab.policies.functions import PYTHON, from_python
@@ -133,6 +133,7 @@ def _run(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
         estimator=estimator,
         action_names=(known if is_numbered(found.action_names) else found).action_names,
         make=place.make,
+        policy=estimator if isinstance(estimator, Policy) else None,
         seconds_per_step=found.seconds_per_step,
         origin=place.origin(f"{path}{at}", None, away=env is not None, module=module),
         copying=place.copying,

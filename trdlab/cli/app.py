@@ -20,7 +20,7 @@ COMMANDS = {
     "train": "trdlab.cli.train",
     "resume": "trdlab.cli.train",
     "evaluate": "trdlab.cli.train",
-    "runs": "trdlab.cli.train",
+    "runs": "trdlab.cli.runs",
     "study": "trdlab.cli.study",
 }
 """The module of each command, where it is the function, or the group, of the same name."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from trdlab.deep.presets import preset
+from trdlab.deep.presets import preset, with_teacher
 from trdlab.deep.settings import Kind, TrainSettings
 
 _POSITIONAL = ("kind", "env")
@@ -19,7 +19,10 @@ def with_settings(kind: Kind) -> Callable[[Callable[..., Any]], Callable[..., An
     Args:
         kind: whose default preset the help shows.
     """
-    shown = preset(kind, "").to_config()
+    usual = preset(kind, "")
+    taught = with_teacher(kind, usual)
+    shown = {key: of.default for key, of in _keys().items()} | usual.to_config()
+    shown |= {key: taught[key] for key in ("teacher_steps", "offline_updates")}
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         own = [
@@ -27,7 +30,7 @@ def with_settings(kind: Kind) -> Callable[[Callable[..., Any]], Callable[..., An
             for parameter in inspect.signature(command, eval_str=True).parameters.values()
             if parameter.name != "given"
         ]
-        options = {key: _option(key, shown.get(key)) for key in _keys()}
+        options = {key: _option(key, shown[key]) for key in _keys()}
         signature = inspect.Signature([*own, *options.values()])
 
         def run(**values: Any) -> Any:

@@ -63,12 +63,12 @@ class TrainingProgress(Bar):
 
     Args:
         console: where to; a bar if it is a terminal, otherwise a line now and then.
-        total: the agent steps of the whole run.
+        total: the steps of the whole run, by its clock.
         done: those taken before.
     """
 
     def __init__(self, console: Console, total: int, done: int = 0) -> None:
-        self._total, self._first, self._begun = total, done, time.monotonic()
+        self._what, self._first, self._begun = "steps", done, time.monotonic()
         self._state = "score –, loss –"
         super().__init__(
             console,
@@ -93,11 +93,14 @@ class TrainingProgress(Bar):
         """Shows where the run stands, if it is time to."""
         if not self.is_due():
             return
-        done = trainer.agent_steps
-        steps = f"{done:,} of {self._total:,} steps{self._speed(done)}"
-        self.show(f"{steps}, {self._state}", completed=done, steps=steps, state=self._state)
+        done, total, what = trainer.standing
+        steps = f"{done:,} of {total:,} {what}{self._speed(trainer.clock, what)}"
+        line = f"{steps}, {self._state}"
+        self.show(line, completed=trainer.clock, steps=steps, state=self._state)
 
-    def _speed(self, done: int) -> str:
+    def _speed(self, done: int, what: str) -> str:
+        if what != self._what:  # another phase has a speed of its own
+            self._what, self._first, self._begun = what, done, time.monotonic()
         passed = time.monotonic() - self._begun
         return f", {(done - self._first) / passed:,.0f}/s" if passed > 1.0 else ""
 

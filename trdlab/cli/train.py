@@ -1,7 +1,7 @@
-"""`trdlab train`, `resume`, `evaluate`, `runs`: a network that decomposes, start to score."""
+"""`trdlab train`, `resume`, `evaluate`: a network that decomposes, start to score."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -115,10 +115,20 @@ def resume(
             "--agent-steps", help="Steps in all, if more than before.", show_default="as it began"
         ),
     ] = None,
+    teacher: Annotated[
+        str | None,
+        typer.Option(
+            "--teacher",
+            metavar="AGENT",
+            help="Where its teacher is now, if it was moved; one that is code must be named.",
+            show_default="as it began",
+        ),
+    ] = None,
     modules: common.Import = None,
     verbose: common.Verbose = False,
 ) -> None:
     """Go on with a run or a fit that was stopped, as if it had not been; or make a run longer."""
+    from trdlab.agents.teachers import find_teacher
     from trdlab.cli.fit import go_on
     from trdlab.runs.folder import is_fit
     from trdlab.training.run import resume as pick_up
@@ -127,7 +137,11 @@ def resume(
     if is_fit(path) and step is agent_steps is None:
         go_on(path)
         return
-    _carry_on(lambda: pick_up(path, step, agent_steps=agent_steps), longer=agent_steps is not None)
+
+    def picked_up() -> "AbstractContextManager[Run]":
+        return pick_up(path, step, agent_steps=agent_steps, find=find_teacher, teacher=teacher)
+
+    _carry_on(picked_up, longer=agent_steps is not None)
 
 
 def evaluate(
@@ -172,35 +186,6 @@ def evaluate(
     )
 
 
-def runs(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where runs are kept.")] = Path(
-        "runs"
-    ),
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Draw their scores: .png, .pdf or .svg.")
-    ] = None,
-    overwrite: common.Overwrite = False,
-    verbose: common.Verbose = False,
-) -> None:
-    """List the runs in a folder: what they learn, how far they are, and their score."""
-    from trdlab.runs import list_runs
-    from trdlab.show.training import runs_page
-
-    if plot is not None:
-        from trdlab.show.plots.style import check_picture
-
-        check_picture(plot, overwrite=overwrite)
-    found = list_runs(folder)
-    if not found:
-        _say(common.new_console()[0], f"There are no runs in '{folder}'.")
-        return
-    common.print_text(runs_page(found))
-    if plot is not None:
-        from trdlab.show.plots.training import curves_figure
-
-        common.save_picture(curves_figure([run.path for run in found if run.fault is None]), plot)
-
-
 def _train(
     kind: "Kind",
     env: str,
@@ -216,11 +201,29 @@ def _train(
     settings = read_settings(kind, env, preset_name, config, given)
     origin = origin_line(kind, env, preset_name, config)
     if dry_run:
+        from trdlab.agents.teachers import find_teacher
         from trdlab.show.training import plan_page
 
-        common.print_text(plan_page(plan(settings), origin))
+        common.print_text(plan_page(plan(settings, find_teacher), origin))
         return
-    _carry_on(lambda: begin(settings, out), origin)
+    if settings.teacher is None:
+        _carry_on(lambda: begin(settings, out), origin)
+        return
+    _carry_on(lambda: _taught(settings, out), origin)
+
+
+@contextmanager
+def _taught(settings: "TrainSettings", out: Path | None) -> Iterator["Run"]:
+    """Begins a run that learns from a teacher, and shows how that one is measured."""
+    from trdlab.agents.teachers import find_teacher
+    from trdlab.cli.progress import EpisodeProgress
+    from trdlab.training.run import begin
+
+    with ExitStack() as stack:
+        with EpisodeProgress(common.errors(), "Measuring the teacher") as progress:
+            told = progress.on_progress
+            run = stack.enter_context(begin(settings, out, find=find_teacher, watch=told))
+        yield run
 
 
 def _carry_on(
@@ -243,6 +246,9 @@ def _carry_on(
         duration,
         longer_line,
         memory_line,
+        reached_line,
+        stopped_line,
+        teacher_line,
         updates_lines,
     )
     from trdlab.training.run import carry_on
@@ -254,6 +260,8 @@ def _carry_on(
         _say(errors, f"Run: {path}")
         if origin:
             _say(errors, origin)
+        if run.trainer.lessons:
+            _say(errors, teacher_line(settings, run.trainer.lessons.levels))
         if longer:
             _say(errors, longer_line(settings, run.trainer.agent_steps))
         _say(errors, memory_line(run.memory, available_memory()))
@@ -261,7 +269,7 @@ def _carry_on(
             _say(errors, line)
         if run.problem is not None:
             _say(errors, f"{run.problem.cause} New episodes are begun in their place.")
-        with TrainingProgress(errors, settings.agent_steps, run.trainer.agent_steps) as progress:
+        with TrainingProgress(errors, settings.clock_end, run.trainer.clock) as progress:
             try:
                 done = carry_on(
                     run,
@@ -271,17 +279,22 @@ def _carry_on(
                 )
             except (EnvironmentFault, OutputError) as error:  # which can be mended from outside
                 raise type(error)(error.cause, f"{error.cure} {go_on}") from error
-        steps = run.trainer.agent_steps
+        steps, clock = run.trainer.agent_steps, run.trainer.clock
         if not done:
-            _say(errors, f"Stopped and saved at {steps:,} agent steps.")
+            _say(errors, stopped_line(run.trainer.standing))
             _say(errors, go_on)
             raise typer.Exit(stop.code or 0)
     _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
     best, episodes = best_step(run.folder), settings.checkpoint_episodes
-    if line := best_line(path, steps, best, episodes=episodes):
+    if line := best_line(path, clock, best, episodes=episodes):
         _say(errors, line)
-    if settings.evaluate_episodes:
-        _compare_with_chance(run.folder, _evaluate(path), settings)
+    if not settings.evaluate_episodes:
+        return
+    result = _evaluate(path)
+    if run.trainer.lessons:
+        _say(errors, reached_line(float(result.returns.mean()), run.trainer.lessons.levels))
+    else:
+        _compare_with_chance(run.folder, result, settings)
 
 
 def _named(run: Path, checkpoint: int | None) -> tuple[Path, int | None]:
@@ -298,8 +311,9 @@ def _named(run: Path, checkpoint: int | None) -> tuple[Path, int | None]:
 def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
     """Evaluates the agent of a run, prints the result, and says where it is kept."""
     from trdlab.cli.progress import EpisodeProgress
-    from trdlab.show.training import evaluation_page
-    from trdlab.training.loading import evaluate_run
+    from trdlab.runs import RunFolder
+    from trdlab.show.training import acts, evaluation_page
+    from trdlab.training.loading import evaluate_run, run_settings
 
     errors = common.errors()
     with EpisodeProgress(errors) as progress:
@@ -307,7 +321,8 @@ def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
     if as_json:
         common.print_json(result.to_dict())
     else:
-        common.print_text(evaluation_page(result))
+        acting = acts(run_settings(RunFolder.open(path)))
+        common.print_text(evaluation_page(result, how=acting))
     _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
     return result
 

@@ -19,29 +19,29 @@ class Board:
     def __init__(self, writer: Any = None) -> None:
         self._writer = writer
 
-    def write(self, row: Mapping[str, Any]) -> None:
-        """Writes a line of metrics; what is None is left out."""
+    def write(self, row: Mapping[str, Any], step: int) -> None:
+        """Writes a line of metrics at a step; what is no number is left out."""
         if self._writer is None:
             return
         for name, value in row.items():
-            if value is not None and name != "agent_steps":
-                self._writer.add_scalar(name, value, row["agent_steps"])
+            if isinstance(value, int | float) and name not in ("agent_steps", "clock"):
+                self._writer.add_scalar(name, value, step)
         self._writer.flush()
 
 
 @contextmanager
-def board(folder: Path, agent_steps: int, *, wanted: bool) -> Iterator[Board]:
+def board(folder: Path, step: int, *, wanted: bool) -> Iterator[Board]:
     """Opens a board, and closes it again.
 
     Args:
         folder: where its files go.
-        agent_steps: where the run stands: what a killed process has written of later is hidden.
+        step: where the run stands: what a killed process has written of later is hidden.
         wanted: whether anything should be written.
     """
     if not wanted:
         yield Board()
         return
-    writer = _tensorboard().SummaryWriter(str(folder), purge_step=agent_steps + 1)
+    writer = _tensorboard().SummaryWriter(str(folder), purge_step=step + 1)
     try:
         yield Board(writer)
     finally:

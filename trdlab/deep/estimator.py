@@ -1,14 +1,17 @@
 """A network as an Estimator: numpy observations in, decompositions out."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
 
-from trdlab.arrays import FloatArray
+from trdlab.arrays import BoolArray, FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.deep.channels import Channels, outlook_of, reward_of, within
+from trdlab.deep.loss import acted
 from trdlab.deep.networks import DecompositionNetwork
 from trdlab.errors import InputError
 from trdlab.estimator import Future, Outlook
@@ -79,6 +82,19 @@ class NetworkEstimator:
 
     def _told(self, observations: Any) -> FloatArray:
         """Returns all that the network tells: `[B, A, N+1]`, or of channels `[B, A, C, N+1]`."""
+        components = self._asked(self.network, observations)  # [B, A, N+1], or [B, A·C, N+1]
+        if not self.channels:
+            return components
+        shape = (len(components), -1, len(self.channels), self.time_axis.num_components)
+        components = components.reshape(shape)  # [B, A, C, N+1]
+        return (
+            components
+            if self.possible is None
+            else within(self.channels, components, self.possible)
+        )
+
+    def _asked(self, tell: Callable[[Tensor], Tensor], observations: Any) -> FloatArray:
+        """Returns what the network tells of observations `[B, ...]`, batch by batch."""
         array = np.array(observations)  # [B, ...], a copy that PyTorch may own
         if array.dtype.kind not in "fiub":
             raise InputError(
@@ -99,18 +115,30 @@ class NetworkEstimator:
         try:
             with torch.inference_mode():
                 parts = [
-                    self.network(batch.to(self.device)).cpu()  # [≤ batch_size, A, N+1]
+                    tell(batch.to(self.device)).cpu()  # [≤ batch_size, ...]
                     for batch in torch.split(torch.from_numpy(array), self.batch_size)
                 ]
         finally:
             self.network.train(was_training)
-        components: FloatArray = torch.cat(parts).numpy()  # [B, A, N+1], or [B, A·C, N+1]
-        if not self.channels:
-            return components
-        shape = (len(array), -1, len(self.channels), self.time_axis.num_components)
-        components = components.reshape(shape)  # [B, A, C, N+1]
-        return (
-            components
-            if self.possible is None
-            else within(self.channels, components, self.possible)
-        )
+        told: FloatArray = torch.cat(parts).numpy()
+        return told
+
+
+@dataclass(frozen=True, eq=False)
+class ActingEstimator(NetworkEstimator):
+    """Decomposes, and acts by the network's policy head, whose future it tells: a Policy, too.
+
+    Args:
+        draw: whether it draws its actions, rather than taking the likeliest.
+    """
+
+    draw: bool = False
+
+    def act(self, observations: Any, state: Any, begins: BoolArray) -> tuple[FloatArray, Any]:
+        """Returns how likely it takes each action `[B, A]`; there is nothing to remember.
+
+        Raises:
+            InputError: as for `decompose`.
+        """
+        logits = torch.from_numpy(self._asked(self.network.logits, observations))  # [B, A]
+        return acted(logits, draw=self.draw).numpy(), None

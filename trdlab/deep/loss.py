@@ -4,10 +4,10 @@ import math
 from typing import get_args
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from trdlab import bellman
-from trdlab.deep.settings import Loss, Reduction
+from trdlab.deep.update_settings import Loss, Reduction
 from trdlab.errors import InputError, TrdlabError
 
 
@@ -20,8 +20,28 @@ def greedy_actions(components: Tensor) -> Tensor:
     return components.sum(dim=-1).argmax(dim=-1)  # [B, A, N+1] -> [B, A] -> [B]
 
 
+def acted(logits: Tensor, *, draw: bool) -> Tensor:
+    """Returns `[B, A]`, how likely a policy head takes each action.
+
+    Args:
+        logits: `[B, A]`.
+        draw: whether it draws its actions, rather than taking the likeliest.
+
+    >>> acted(torch.tensor([[0.0, 2.0]]), draw=False).tolist()
+    [[0.0, 1.0]]
+    """
+    if draw:
+        return logits.softmax(dim=1)
+    return nn.functional.one_hot(logits.argmax(dim=1), logits.shape[1]).to(logits.dtype)
+
+
 def trd_target(
-    reward: Tensor, discount: Tensor, next_components: Tensor, *, selected_by: Tensor | None = None
+    reward: Tensor,
+    discount: Tensor,
+    next_components: Tensor,
+    *,
+    selected_by: Tensor | None = None,
+    policy: Tensor | None = None,
 ) -> Tensor:
     """Returns the target components `[B, N+1]`, without gradients.
 
@@ -31,6 +51,8 @@ def trd_target(
         next_components: `[B, A, N+1]` at s_(t+w), of the target network.
         selected_by: `[B, A, N+1]` at s_(t+w), whose sums choose the next action: those of the
             online network for double DQN (van Hasselt et al., 2016), by default `next_components`.
+        policy: `[B, A]` at s_(t+w), how likely each action is taken there, where the future of a
+            given policy is learned: then nothing is maximised.
 
     Raises:
         InputError: the shapes do not fit.
@@ -49,7 +71,10 @@ def trd_target(
             "Give [B, A, N+1] for both.",
         )
     with torch.no_grad():
-        chosen = of_actions(next_components, greedy_actions(chooser))  # [B, N+1]
+        if policy is None:
+            chosen = of_actions(next_components, greedy_actions(chooser))  # [B, N+1]
+        else:
+            chosen = torch.einsum("ba,ban->bn", policy, next_components)  # [B, N+1]
         target: Tensor = bellman.target(reward, discount, chosen)  # [B, N+1]
     return target
 
@@ -113,6 +138,25 @@ def td_loss(
     if loss == "huber":
         errors = torch.where(errors > 1.0, 2.0 * errors.clamp(min=1.0).sqrt() - 1.0, errors)  # [B]
     return errors.mean()
+
+
+def distillation_loss(logits: Tensor, taught: Tensor) -> Tensor:
+    """Returns KL(teacher ‖ student), averaged over the batch; a scalar.
+
+    Args:
+        logits: `[B, A]` of the student, divided by the temperature.
+        taught: `[B, A]`, the teacher's probabilities, likewise.
+
+    Source: the paper's Eq. qdagger, with the sign of errata P5; Hinton et al. (2015).
+
+    >>> even = torch.tensor([[0.0, 0.0]])
+    >>> distillation_loss(even, torch.tensor([[0.5, 0.5]]))
+    tensor(0.)
+    >>> distillation_loss(even, torch.tensor([[1.0, 0.0]]))  # ln 2
+    tensor(0.6931)
+    """
+    told = nn.functional.log_softmax(logits, dim=1)  # [B, A]
+    return nn.functional.kl_div(told, taught, reduction="batchmean")
 
 
 def of_actions(components: Tensor, actions: Tensor) -> Tensor:

@@ -31,6 +31,9 @@ class DecompositionNetwork(nn.Module):
     `forward` is `components(preprocess(observations))`. The two are apart because a gradient with
     respect to the observations exists from the floating-point inputs on.
 
+    Beside `head` there can be a `policy_head`, which reads the same features and says how to act:
+    logits `[B, A]`. The components then tell the future of that policy.
+
     Args:
         body: preprocessed inputs to features `[B, F]`.
         head: features to `[B, A·(N+1)]`, action by action.
@@ -49,6 +52,7 @@ class DecompositionNetwork(nn.Module):
     ) -> None:
         super().__init__()
         self.body, self.head = body, head
+        self.policy_head: nn.Linear | None = None
         self.observation_shape = observation_shape
         self.num_actions, self.num_components = num_actions, num_components
 
@@ -67,7 +71,24 @@ class DecompositionNetwork(nn.Module):
 
     def components(self, inputs: Tensor) -> Tensor:
         """Returns the components `[B, A, N+1]` of preprocessed inputs."""
-        flat: Tensor = self.head(self.body(inputs))  # [B, ...] -> [B, F] -> [B, A·(N+1)]
+        return self._by_action(self.body(inputs))  # [B, ...] -> [B, F] -> [B, A, N+1]
+
+    def told(self, observations: Tensor) -> tuple[Tensor, Tensor | None]:
+        """Returns the components `[B, A, N+1]`, and the logits `[B, A]` of the policy head."""
+        features = self.body(self.preprocess(observations))  # [B, F]
+        logits = None if self.policy_head is None else self.policy_head(features)  # [B, A]
+        return self._by_action(features), logits
+
+    def logits(self, observations: Tensor) -> Tensor:
+        """Returns `[B, A]`, by which it acts: of the policy head, or else the sums of components.
+
+        Of observations `[B, ...]`.
+        """
+        components, logits = self.told(observations)
+        return components.sum(dim=-1) if logits is None else logits
+
+    def _by_action(self, features: Tensor) -> Tensor:
+        flat: Tensor = self.head(features)  # [B, F] -> [B, A·(N+1)]
         return flat.reshape(len(flat), self.num_actions, self.num_components)  # [B, A, N+1]
 
     def _check_shape(self, observations: Tensor) -> None:
@@ -207,6 +228,7 @@ def build_network(
     seed: int | torch.Generator | None = 0,
     hidden: Sequence[int] = (128, 128),
     channels_last: bool = True,
+    policy_head: bool = False,
 ) -> DecompositionNetwork:
     """Returns the network that fits an observation space, with weights drawn from a seed.
 
@@ -222,6 +244,7 @@ def build_network(
             their shapes.
         hidden: the sizes of the MLP's hidden layers.
         channels_last: the CNN's memory layout; it changes speed, not the weights.
+        policy_head: whether there is one; its weights are drawn after all others.
 
     Raises:
         InputError: the observation space is of another kind, or its images are too small.
@@ -233,6 +256,20 @@ def build_network(
     """
     rng = torch.Generator().manual_seed(seed) if isinstance(seed, int) else seed
     outputs = (num_actions, time_axis.num_components)
+    network = _plain(observation_space, outputs, rng, hidden, channels_last)
+    if policy_head:
+        network.policy_head = linear(network.head.in_features, num_actions, rng)
+    return network
+
+
+def _plain(
+    observation_space: gym.Space[Any],
+    outputs: tuple[int, int],
+    rng: torch.Generator | None,
+    hidden: Sequence[int],
+    channels_last: bool,
+) -> DecompositionNetwork:
+    """Returns the network of a space, with the one head that all have."""
     if isinstance(observation_space, gym.spaces.Discrete):
         states, first = int(observation_space.n), int(observation_space.start)
         return VectorNetwork(

@@ -155,6 +155,29 @@ def preset(kind: Kind, env: str, name: str | None = None) -> TrainSettings:
     return TrainSettings(kind, env).changed(known[wanted][1], f"The preset '{wanted}'")
 
 
+def with_teacher(kind: Kind, base: TrainSettings) -> Config:
+    """Returns what else suits a run that learns from a teacher, and need not begin at random.
+
+    Args:
+        kind: of the run.
+        base: the settings that it would have without one.
+
+    >>> lines = with_teacher("atari", preset("atari", "Breakout"))
+    >>> lines["epsilon_start"], lines["teacher_steps"], lines["offline_updates"]
+    (0.01, 100000, 30000)
+    """
+    lines: Config = {
+        "epsilon_start": base.epsilon_end,
+        "learning_starts": min(base.learning_starts, 10_000),
+    }
+    if kind == "atari":
+        few = {"checkpoint_every": 10_000, "log_every": 1_000}
+        lines |= {name: min(value, getattr(base, name)) for name, value in few.items()}
+    steps, updates = (100_000, 30_000) if kind == "atari" else (20_000, 5_000)
+    steps, updates = min(steps, base.agent_steps), min(updates, base.agent_steps // 4)
+    return lines | {"teacher_steps": steps, "offline_updates": updates}
+
+
 def default_preset(kind: Kind, env: str) -> str:
     """Returns the name of the preset for an environment: its own, or else that of its kind."""
     return _own(kind, env) or DEFAULT_PRESETS[kind]

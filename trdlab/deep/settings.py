@@ -9,62 +9,14 @@ from typing import Any, Literal, Self, get_args
 
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.options import check_range, option, typed
+from trdlab.deep.update_settings import Precision as Precision
+from trdlab.deep.update_settings import UpdateSettings as UpdateSettings
 from trdlab.errors import InputError, closest
 
 Kind = Literal["gym", "atari"]
-Reduction = Literal["sum", "mean"]
-Loss = Literal["squared", "huber"]
-Precision = Literal["float32", "bfloat16"]
-
-
-@dataclass(frozen=True)
-class UpdateSettings:
-    """How to learn; the defaults are the paper's (Appendix B).
-
-    Args:
-        learning_rate: of Adam.
-        target_sync_updates: the updates, not agent steps, between two copies of the network to
-            the target network (errata C6).
-        reduction: over components, see `td_loss`.
-        loss: of their errors, see there.
-        max_grad_norm: the length to which longer gradients are cut; None leaves them.
-        double: whether the online network chooses the next action (double DQN).
-        precision: what the networks compute in; bfloat16 keeps two or three digits. Weights,
-            targets and the loss are float32 in either case.
-
-    Raises:
-        InputError: a value is out of its range.
-    """
-
-    learning_rate: float = 1e-4
-    target_sync_updates: int = 1000
-    reduction: Reduction = "sum"
-    loss: Loss = "squared"
-    max_grad_norm: float | None = None
-    double: bool = False
-    precision: Precision = "float32"
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.learning_rate < float("inf"):
-            raise InputError(f"The learning rate is {self.learning_rate}.", "Choose one above 0.")
-        if self.target_sync_updates < 1:
-            raise InputError(
-                f"`target_sync_updates` is {self.target_sync_updates}.",
-                "Copy the network every 1 or more updates.",
-            )
-        longest = self.max_grad_norm
-        if longest is not None and not 0.0 < longest < float("inf"):
-            raise InputError(f"`max_grad_norm` is {longest}.", "Choose a length above 0.")
-        for name, known in (
-            ("loss", get_args(Loss)),
-            ("reduction", get_args(Reduction)),
-            ("precision", get_args(Precision)),
-        ):
-            if getattr(self, name) not in known:
-                raise InputError(
-                    f"The {name} is {getattr(self, name)!r}.",
-                    f"Use {' or '.join(map(repr, known))}.",
-                )
+Distil = Literal["auto", "values", "policy"]
+TEACHING = "Learning from a teacher"
+"""Under which heading the options stand that mean nothing without one."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +68,10 @@ class TrainSettings:
         1, "Steps to hold a random action: 1 to so many, drawn evenly.", "Acting", least=1
     )
     learning_starts: int = option(
-        1_000, "Agent steps, at random, before the first update.", "Learning", least=1
+        1_000,
+        "Agent steps before the first update; at random, unless there is a teacher.",
+        "Learning",
+        least=1,
     )
     update_every: int = option(4, "Agent steps for each update.", "Learning", least=1)
     batch_size: int = option(32, "Windows in each update.", "Learning", least=1)
@@ -146,7 +101,9 @@ class TrainSettings:
         "Learning",
         kind=float,
     )
-    double: bool = option(False, "Double DQN: the online network chooses.", "Learning")
+    double: bool = option(
+        False, "Double DQN: the online network chooses; not with a policy head.", "Learning"
+    )
     precision: Literal["auto", "float32", "bfloat16"] = option(
         "float32",
         "float32; bfloat16, less exact and often quicker; or auto: the quicker one here.",
@@ -170,6 +127,42 @@ class TrainSettings:
     )
     capacity: int = option(
         100_000, "Transitions that the replay memory holds.", "Learning", least=1
+    )
+    teacher: str | None = option(
+        None,
+        "Learn from this agent, whatever `trdlab agent` can name.",
+        TEACHING,
+        kind=str,
+        metavar="AGENT",
+    )
+    teacher_steps: int = option(
+        20_000, "Steps that the teacher takes first, of all environments.", TEACHING, least=0
+    )
+    teacher_epsilon: float = option(
+        0.05, "Chance of a random action in them.", TEACHING, least=0, most=1
+    )
+    offline_updates: int = option(
+        5_000, "Updates on these steps, before the agent takes its own.", TEACHING, least=0
+    )
+    distillation: float = option(
+        1.0,
+        "Weight of the teacher in the loss; it falls to 0 as the score reaches the teacher's.",
+        TEACHING,
+        least=0,
+    )
+    distil: Literal["auto", "values", "policy"] = option(
+        "auto",
+        "What to take over: values, into the components; or policy, by a head of its own, whose "
+        "future the components tell; auto: values where the teacher has some.",
+        TEACHING,
+    )
+    temperature: float = option(
+        1.0,
+        "Of the probabilities that are compared: above 1 evens them out, below sharpens them.",
+        TEACHING,
+    )
+    draw: bool = option(
+        False, "With a policy head: draw actions, rather than take the likeliest.", TEACHING
     )
     clip_rewards: bool = option(False, "Learn from the sign of each reward.", "Reward and ending")
     life_loss_ends: bool = option(
@@ -225,11 +218,40 @@ class TrainSettings:
                 f"{self.capacity} transitions.",
                 "Choose a smaller `batch_size` or a larger `capacity`.",
             )
+        if self.distil not in get_args(Distil):
+            known = ", ".join(get_args(Distil))
+            raise InputError(f"`distil` is '{self.distil}'.", f"Use one of: {known}.")
+        self._check_teaching(max(windows, self.batch_size))
+
+    def _check_teaching(self, needed: int) -> None:
+        """Refuses options of a teacher where there is none, and phases that do not fit together."""
+        if self.teacher is None:
+            for of in fields(self):
+                if of.metadata.get("panel") == TEACHING and getattr(self, of.name) != of.default:
+                    raise InputError(f"`{of.name}` is for learning from a teacher.", "Name one.")
+            return
+        steps, updates = self.teacher_steps, self.offline_updates
+        if updates and steps < needed:
+            raise InputError(
+                f"`teacher_steps` is {steps}: too few for {updates} `offline_updates` in batches.",
+                f"Choose {needed} or more, or no offline updates.",
+            )
+        if steps and not updates:
+            raise InputError(
+                f"`offline_updates` is 0: nothing would learn from {steps} steps of the teacher.",
+                "Choose more, or set `teacher_steps` to 0, too.",
+            )
 
     @property
     def time_axis(self) -> TimeAxis:
         """γ, N and w."""
         return TimeAxis(self.gamma, self.horizon, self.width)
+
+    @property
+    def clock_end(self) -> int:
+        """What a run does in all: the teacher's steps, the offline updates, and its own steps."""
+        taught = self.teacher_steps + self.offline_updates if self.teacher is not None else 0
+        return taught + self.agent_steps
 
     @property
     def update_settings(self) -> UpdateSettings:
@@ -239,8 +261,11 @@ class TrainSettings:
         return UpdateSettings(**told | exact)
 
     def epsilon(self, agent_steps: int) -> float:
-        """Returns the chance of a random action after so many agent steps."""
-        if agent_steps < self.learning_starts:
+        """Returns the chance of a random action after so many agent steps.
+
+        Whoever learns from a teacher knows something by then, and need not begin at random.
+        """
+        if agent_steps < self.learning_starts and self.teacher is None:
             return 1.0
         part = min(1.0, agent_steps / max(1, self.epsilon_steps))
         return (1.0 - part) * self.epsilon_start + part * self.epsilon_end
@@ -259,6 +284,9 @@ class TrainSettings:
     def to_config(self) -> dict[str, Any]:
         """Returns the lines of a configuration file, in the order of the options."""
         config = {key: getattr(self, name) for key, name in _names().items()}
+        if self.teacher is None:  # the rest would mean nothing
+            idle = {of.name for of in fields(self) if of.metadata.get("panel") == TEACHING}
+            config = {key: value for key, value in config.items() if key not in idle}
         return {
             key: list(value) if isinstance(value, tuple) else value
             for key, value in config.items()

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from trdlab.deep.loss import finite_loss, of_actions, td_loss, trd_target
+from trdlab.deep.loss import acted, distillation_loss, finite_loss, of_actions, td_loss, trd_target
 from trdlab.deep.networks import DecompositionNetwork
-from trdlab.deep.settings import UpdateSettings
+from trdlab.deep.update_settings import UpdateSettings
 from trdlab.errors import InputError
 
 
@@ -54,12 +54,14 @@ class Metrics(NamedTuple):
     """What an update tells of itself.
 
     Args:
-        loss: see `td_loss`.
+        loss: all that was learned from: see `td_loss`, and what a teacher adds.
         mean_value: the mean Q-value of the actions taken.
+        distance: see `distillation_loss`; 0 without a teacher.
     """
 
     loss: float
     mean_value: float
+    distance: float = 0.0
 
 
 class Learner:
@@ -90,31 +92,28 @@ class Learner:
         )
         self.num_updates = 0
 
-    def update(self, batch: Windows) -> Metrics:
+    def update(self, batch: Windows, *, taught: Any = None, distillation: float = 0.0) -> Metrics:
         """Learns from a batch once, and copies the target network when it is due.
+
+        Args:
+            batch: of windows.
+            taught: `[B, A]`, the probabilities of a teacher, where there is one.
+            distillation: what they weigh: λ.
 
         Raises:
             TrdlabError: the loss is not finite; nothing has changed then.
             InputError: the shapes or types do not fit.
         """
         settings = self.settings
-        observations = self._tensor(batch.observations)  # [B, ...]
         actions = self._tensor(batch.actions)  # [B]
-        next_observations = self._tensor(batch.next_observations)  # [B, ...]
-
-        with torch.no_grad():
-            following = self._components(self.target_network, next_observations)  # [B, A, N+1]
-            chooser = (
-                self._components(self.q_network, next_observations) if settings.double else None
-            )  # [B, A, N+1]
-        target = trd_target(
-            self._tensor(batch.rewards),
-            self._tensor(batch.discounts),
-            following,
-            selected_by=chooser,
-        )  # [B, N+1]
-        components = self._components(self.q_network, observations)  # [B, A, N+1]
+        target = self._target(batch)  # [B, N+1]
+        components, logits = self._told(self.q_network, self._tensor(batch.observations))
         loss = td_loss(components, actions, target, settings.reduction, settings.loss)
+        distance = torch.zeros_like(loss)
+        if taught is not None:
+            student = components.sum(dim=-1) if logits is None else logits  # [B, A]
+            distance = distillation_loss(student / settings.temperature, self._tensor(taught))
+            loss = loss + distillation * distance
         number = finite_loss(loss, self.num_updates + 1)
 
         self.optimizer.zero_grad(set_to_none=True)
@@ -127,7 +126,26 @@ class Learner:
         if self.num_updates % settings.target_sync_updates == 0:
             self.sync_target()
         values = of_actions(components.detach(), actions).sum(dim=1)  # [B]
-        return Metrics(number, float(values.mean()))
+        value, apart = torch.stack([values.mean(), distance.detach()]).tolist()
+        return Metrics(number, value, apart)
+
+    def _target(self, batch: Windows) -> Tensor:
+        """Returns what the components `[B, N+1]` should have been."""
+        settings, following = self.settings, self._tensor(batch.next_observations)  # [B, ...]
+        with torch.no_grad():
+            components, logits = self._told(self.target_network, following)  # [B, A, N+1], [B, A]
+            chooser = policy = None
+            if logits is not None:
+                policy = acted(logits, draw=settings.draw)  # [B, A]
+            elif settings.double:
+                chooser = self._told(self.q_network, following)[0]  # [B, A, N+1]
+        return trd_target(
+            self._tensor(batch.rewards),
+            self._tensor(batch.discounts),
+            components,
+            selected_by=chooser,
+            policy=policy,
+        )
 
     def sync_target(self) -> None:
         """Copies the network to the target network."""
@@ -154,11 +172,12 @@ class Learner:
         Raises:
             InputError: it was taken with other settings, or of another network.
         """
-        if state["settings"] != asdict(self.settings):
+        then = asdict(UpdateSettings()) | state["settings"]  # older runs did not know all of them
+        if then != asdict(self.settings):
             changed = [
-                f"{name} {state['settings'].get(name)} there, {value} here"
+                f"{name} {then.get(name)} there, {value} here"
                 for name, value in asdict(self.settings).items()
-                if state["settings"].get(name) != value
+                if then.get(name) != value
             ]
             raise InputError(f"The settings differ: {'; '.join(changed)}.", "Use the same ones.")
         self.num_updates = state["num_updates"]
@@ -166,16 +185,18 @@ class Learner:
         load_weights(self.target_network, state["target_network"])
         load_moments(self.optimizer, self.q_network, state["optimizer"])
 
-    def _components(self, network: DecompositionNetwork, observations: Tensor) -> Tensor:
-        """Returns `[B, A, N+1]`, float32.
+    def _told(
+        self, network: DecompositionNetwork, observations: Tensor
+    ) -> tuple[Tensor, Tensor | None]:
+        """Returns components `[B, A, N+1]` and the logits of a policy head `[B, A]`, float32.
 
         A context of its own for each call: autocast caches the weights it has cast, and those of a
         call without gradients must not serve one with.
         """
         reduced = self.settings.precision == "bfloat16"
         with torch.autocast(self.device.type, torch.bfloat16, enabled=reduced):
-            components: Tensor = network(observations)
-        return components.float()
+            components, logits = network.told(observations)
+        return components.float(), None if logits is None else logits.float()
 
     def _tensor(self, array: Any) -> Tensor:
         if isinstance(array, np.ndarray) and not array.flags.writeable:

@@ -187,7 +187,7 @@ class Playing:
                 likely = self.decide().probabilities  # [R, A]
             count = len(self.running)
             own = np.zeros(count, dtype=np.int64)
-            own[self.running] = _drawn(likely, self._rng.random(count)[self.running])
+            own[self.running] = drawn(likely, self._rng.random(count)[self.running])
             random, actions = np.zeros(count, dtype=np.bool_), own
             if self._epsilon:
                 random = self.running & (self._chance.random(count) < self._epsilon)
@@ -324,14 +324,14 @@ def any_actions(
     """
     if allowed is None:
         return rng.integers(num_actions, size=count)
-    return _drawn(allowed / allowed.sum(axis=1, keepdims=True), rng.random(count))
+    return drawn(allowed / allowed.sum(axis=1, keepdims=True), rng.random(count))
 
 
 def _of(allowed: BoolArray | None, which: BoolArray) -> BoolArray | None:
     return None if allowed is None else allowed[which]
 
 
-def _drawn(probabilities: FloatArray, level: FloatArray) -> IntArray:
+def drawn(probabilities: FloatArray, level: FloatArray) -> IntArray:
     """Returns `[R]`: the action of each that a level in [0, 1) falls to."""
     cumulative = probabilities.cumsum(axis=1)
     level = level * cumulative[:, -1]  # which may not be quite 1

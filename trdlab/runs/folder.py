@@ -16,6 +16,7 @@ from typing import Any, Self
 
 from trdlab.errors import InputError, OutputError, TrdlabError, closest
 from trdlab.files import check_own, read_json, write_json, write_whole
+from trdlab.policies.functions import PYTHON
 from trdlab.runs.config import Config, read_config, to_toml
 from trdlab.runs.lock import hold
 
@@ -153,9 +154,11 @@ class RunFolder:
 
     @property
     def resume_command(self) -> str:
-        """The command that goes on with it, with the module that its own environment needs."""
+        """The command that goes on with it, which names all code that it needs."""
         module = str(self.config.get("env", "")).rpartition(":")[0]
+        teacher = str(self.config.get("teacher", ""))
         words = ["trdlab", "resume", str(self.path), *(("--import", module) if module else ())]
+        words += ["--teacher", teacher] if teacher.startswith(PYTHON) else []
         return shlex.join(words)
 
     @contextmanager

@@ -24,8 +24,8 @@ class MetricsFile:
 
     Args:
         path: the file; it is made if it is not there.
-        after: the agent steps to go on after, those of a checkpoint. What an interrupted run wrote
-            of later ones is cut off, because it will be written again. Without it, only a line
+        after: the step to go on after, that of a checkpoint. What an interrupted run wrote of later
+            ones is cut off, because it will be written again. Without it, only a line
             that was not finished is.
 
     Raises:
@@ -88,6 +88,16 @@ class MetricsFile:
         )
 
 
+def step_of(row: Mapping[str, Any]) -> int:
+    """Returns where a run stood at a line of metrics: by its clock, where it does more than act.
+
+    >>> step_of({"agent_steps": 8}), step_of({"agent_steps": 0, "clock": 30})
+    (8, 30)
+    """
+    step: int = row["clock"] if "clock" in row else row["agent_steps"]
+    return step
+
+
 def read_metrics(path: Path) -> list[dict[str, Any]]:
     """Returns the lines of a metrics file; one that is still being written is left out.
 
@@ -137,16 +147,16 @@ def _length_until(data: bytes, steps: int | None) -> int:
     """
     length = 0
     for line in data.split(b"\n")[:-1]:
-        if steps is not None and _agent_steps(line) > steps:
+        if steps is not None and _step(line) > steps:
             break
         length += len(line) + 1
     return length
 
 
-def _agent_steps(line: bytes) -> float:
+def _step(line: bytes) -> float:
     """Returns where the run stood at a line; of one that is torn or was not ours, the beginning."""
     try:
-        return float(json.loads(line)["agent_steps"])
+        return float(step_of(json.loads(line)))
     except (ValueError, TypeError, LookupError, RecursionError):
         return 0.0
 

@@ -7,12 +7,15 @@ from shlex import quote
 import numpy as np
 from rich.text import Text
 
+from trdlab.deep.lessons import Levels
+from trdlab.deep.metrics import Standing
 from trdlab.deep.settings import TrainSettings
 from trdlab.errors import InputError
 from trdlab.explanations.words import counted
 from trdlab.formatting import decimals_for
 from trdlab.rollouts.evaluation import Evaluation
 from trdlab.runs import RunSummary, to_toml
+from trdlab.runs.metrics import step_of
 from trdlab.show.tables import Row, Table
 from trdlab.show.text import columns, table_lines, wrapped
 from trdlab.statistics import Estimate, bootstrap
@@ -64,6 +67,17 @@ def evaluation_page(
     return Text("\n").join([*lines, *table_lines(table, width)])
 
 
+def acts(settings: TrainSettings) -> str:
+    """Returns how the agent of a run chooses its actions.
+
+    >>> acts(TrainSettings("gym", "CartPole-v1"))
+    'greedy'
+    """
+    if settings.distil != "policy":
+        return "greedy"
+    return "drawing from its policy head" if settings.draw else "by its policy head"
+
+
 def _cut_off(evaluation: Evaluation) -> str:
     """Returns how many episodes were cut off, and after how many steps where all were alike."""
     cut, limit = evaluation.lengths[evaluation.truncated], evaluation.max_steps
@@ -98,10 +112,10 @@ def _row(run: RunSummary) -> tuple[Row, str]:
     except InputError as error:
         return unreadable, str(error)
     score = run.metrics.get("score")
-    steps = max(run.step or 0, run.metrics.get("agent_steps", 0))
+    steps = max(run.step or 0, step_of(run.metrics) if run.metrics else 0)
     told = "" if score is None else _number(score, _decimals(score))
     axis = (str(settings.horizon), str(settings.width))
-    status = _status(run, settings.agent_steps)
+    status = _status(run, settings.clock_end)
     return (name, settings.env, *axis, f"{steps:,}", told, status), ""
 
 
@@ -126,18 +140,61 @@ def memory_line(needed: int, available: int | None) -> str:
     return f"Replay memory: up to {_gigabytes(needed)}{free}."
 
 
+def teacher_line(settings: TrainSettings, levels: Levels) -> str:
+    """Returns whom a run learns from, what that one reaches, and what is learned of it.
+
+    >>> settings = TrainSettings("gym", "CartPole-v1", teacher="agents/ppo.zip", distil="policy")
+    >>> teacher_line(settings, Levels(teacher=500.0, chance=22.5))
+    'Teacher: ppo.zip reaches 500.0, random actions 22.5. A policy head learns what it does.'
+    """
+    decimals = _decimals(levels.teacher, levels.chance)
+    reached = f"reaches {_number(levels.teacher, decimals)}"
+    how = "A policy head learns what it does."
+    if settings.distil == "values":
+        how = "The components learn what it thinks actions are worth."
+    return (
+        f"Teacher: {Path(settings.teacher or '').name} {reached}, random actions "
+        f"{_number(levels.chance, decimals)}. {how}"
+    )
+
+
+def reached_line(mean: float, levels: Levels) -> str:
+    """Returns how far an agent has come on the way from chance to its teacher.
+
+    >>> reached_line(380.0, Levels(teacher=500.0, chance=20.0))
+    'Of the way from random actions (20.0) to its teacher (500.0) it has come 75 %.'
+    """
+    come = (mean - levels.chance) / (levels.teacher - levels.chance)
+    ends = (_number(of, _decimals(of)) for of in (levels.chance, levels.teacher))
+    return "Of the way from random actions ({}) to its teacher ({}) it has come {:.0%}.".format(
+        *ends, come
+    ).replace("%.", " %.")
+
+
 def updates_lines(settings: TrainSettings) -> list[str]:
     """Returns a line that says that a run will learn nothing; none where it will.
 
     >>> updates_lines(TrainSettings("gym", "CartPole-v1", agent_steps=900))
     ['Nothing will be learned: updates begin after 1,000 agent steps, and the run ends after 900.']
     """
-    if settings.updates_due(settings.agent_steps):
+    if settings.updates_due(settings.agent_steps) or settings.teacher is not None:
         return []
     return [
         f"Nothing will be learned: updates begin after {settings.learning_starts:,} agent steps, "
         f"and the run ends after {settings.agent_steps:,}."
     ]
+
+
+def stopped_line(standing: Standing) -> str:
+    """Returns where a run was stopped.
+
+    >>> stopped_line(Standing(8_448, 100_000, "steps"))
+    'Stopped and saved at 8,448 agent steps.'
+    >>> stopped_line(Standing(300, 5_000, "offline updates"))
+    'Stopped and saved at 300 offline updates.'
+    """
+    what = "agent steps" if standing.what == "steps" else standing.what
+    return f"Stopped and saved at {standing.done:,} {what}."
 
 
 def longer_line(settings: TrainSettings, agent_steps: int) -> str:

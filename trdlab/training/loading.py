@@ -21,6 +21,7 @@ from trdlab.training.setup import future, make_environments
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
+    from trdlab.deep.networks import DecompositionNetwork
 
 EVALUATION_SEED = 1000
 """Not that of a run, so that an agent is evaluated from starts that it was not trained from."""
@@ -50,17 +51,31 @@ def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
 
 def _loaded(folder: RunFolder, step: int | None) -> tuple[int, "NetworkEstimator"]:
     """Returns the step of a checkpoint, that of the run's agent unless given, and its agent."""
-    from trdlab.deep.estimator import NetworkEstimator
     from trdlab.deep.networks import build_network
     from trdlab.deep.update import load_weights
 
     settings = run_settings(folder)
     known, hidden = interface_of(folder), settings.hidden
     actions = len(known.action_names)
-    network = build_network(known.space, actions, settings.time_axis, hidden=hidden)
+    has_head = settings.distil == "policy"
+    network = build_network(
+        known.space, actions, settings.time_axis, hidden=hidden, policy_head=has_head
+    )
     step, weights = read_arrays(folder, "q_network", agent_step(folder) if step is None else step)
     load_weights(network, weights)
-    return step, NetworkEstimator(network, settings.time_axis, future(settings))
+    return step, estimator_of(settings, network)
+
+
+def estimator_of(
+    settings: TrainSettings, network: "DecompositionNetwork", device: Any = "cpu"
+) -> "NetworkEstimator":
+    """Returns the network of a run as an Estimator, which acts too where it has a policy head."""
+    from trdlab.deep.estimator import ActingEstimator, NetworkEstimator
+
+    told = network, settings.time_axis, future(settings), device
+    if network.policy_head is None:
+        return NetworkEstimator(*told)
+    return ActingEstimator(*told, draw=settings.draw)
 
 
 def agent_step(folder: RunFolder) -> int | None:

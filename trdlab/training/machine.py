@@ -68,22 +68,25 @@ def use_threads(settings: TrainSettings) -> None:
 def memory_of(
     settings: TrainSettings, environments: Environments, frame_nbytes: float | None = None
 ) -> int:
-    """Returns the bytes that the full replay memory of a run takes.
+    """Returns the bytes that the full replay memory of a run takes: the larger one, if it has two.
 
     Args:
         settings: with its capacity.
         environments: what it remembers.
         frame_nbytes: what a frame takes in it, if that has been measured.
     """
+    from trdlab.deep.lessons import TAUGHT
     from trdlab.deep.memory import memory_needed
 
-    space = environments.observation_space
+    space, has_teacher = environments.observation_space, settings.teacher is not None
+    extras = {TAUGHT: ((environments.num_actions,), np.float32)} if has_teacher else None
     return memory_needed(
-        settings.capacity,
+        max(settings.capacity, settings.teacher_steps if has_teacher else 0),
         space.shape or (),
         np.dtype(space.dtype),
         num_envs=environments.num_envs,
         frame_nbytes=frame_nbytes,
+        extras=extras,
     )
 
 
@@ -98,6 +101,7 @@ def _check_fits(settings: TrainSettings, environments: Environments) -> None:
         settings.time_axis,
         seed=None,  # shapes alone
         hidden=settings.hidden,
+        policy_head=settings.distil == "policy",
     )
     check_learner(learner_nbytes(network, settings.batch_size), _free_on(settings.device))
 

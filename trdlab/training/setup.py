@@ -1,5 +1,6 @@
 """What a run is made of, from its settings: the environments, the device, the plan."""
 
+import math
 import re
 import time
 from collections.abc import Mapping
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trdlab.deep.presets import preset, preset_line
+from trdlab.deep.presets import preset, preset_line, with_teacher
 from trdlab.deep.settings import Kind, TrainSettings, checked
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
@@ -21,7 +22,10 @@ from trdlab.runs import read_config
 from trdlab.training.machine import check_threads, memory_of, resolved, use_threads
 
 if TYPE_CHECKING:
+    from trdlab.deep.lessons import Levels
     from trdlab.deep.trainer import Trainer
+    from trdlab.policies.teacher import Teacher
+    from trdlab.training.teaching import FindTeacher
 
 _MEASURED_SECONDS = 3.0
 
@@ -40,7 +44,7 @@ def read_settings(
     Raises:
         InputError: there is no such preset or file, or a key or value cannot be used.
     """
-    base, in_file = preset(kind, env, preset_name), {}
+    base, in_file, lines = preset(kind, env, preset_name), dict[str, Any](), dict[str, Any]()
     if config is not None:
         lines = _lines_of(config)
         for key, here in (("kind", kind), ("env", env)):
@@ -50,7 +54,9 @@ def read_settings(
             base = TrainSettings(kind, env)
         in_file = checked(lines, f"'{config}'")
     # together, since one may only be in its range beside another
-    return replace(base, **{**in_file, **checked(given, "The command")})
+    told = {**in_file, **checked(given, "The command")}
+    is_taught = "teacher" in told and base.teacher is None and not _is_complete(lines)
+    return replace(base, **{**(with_teacher(kind, base) if is_taught else {}), **told})
 
 
 def origin_line(kind: Kind, env: str, preset_name: str | None, config: Path | None) -> str:
@@ -114,12 +120,16 @@ def _made(settings: TrainSettings, num_envs: int | None, seed: int | None) -> En
     return GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments)
 
 
-def new_trainer(settings: TrainSettings, environments: Environments) -> "Trainer":
+def new_trainer(
+    settings: TrainSettings,
+    environments: Environments,
+    teacher: "tuple[Teacher, Levels] | None" = None,
+) -> "Trainer":
     """Returns the trainer of a run, and lets PyTorch use as many threads as it should."""
     from trdlab.deep.trainer import Trainer
 
     use_threads(settings)
-    return Trainer(settings, environments)
+    return Trainer(settings, environments, teacher)
 
 
 def describe(environments: Environments) -> dict[str, Any]:
@@ -135,6 +145,9 @@ def describe(environments: Environments) -> dict[str, Any]:
 def future(settings: TrainSettings) -> Future:
     """Returns whose future the agent of a run tells: which policy, which reward, which ending."""
     policy = "the greedy policy of the network"
+    if settings.distil == "policy":
+        how = "drawing its actions" if settings.draw else "its likeliest action each time"
+        policy = f"the policy head of the network ({how})"
     if settings.width > 1:
         policy += f" (for the first {settings.width} steps, the ε-greedy one it learned from)"
     return Future(policy, settings.clip_rewards, settings.life_loss_ends)
@@ -159,33 +172,49 @@ class Plan:
     steps_per_second: float
 
 
-def plan(settings: TrainSettings) -> Plan:
+def plan(settings: TrainSettings, find: "FindTeacher | None" = None) -> Plan:
     """Makes a run in miniature, learns for a few seconds, and says what the whole one will take.
 
+    Args:
+        settings: of the run.
+        find: finds its teacher, if it has one; that is not measured.
+
     Raises:
-        InputError: the environments cannot be made, or have no network.
+        InputError: the environments cannot be made, or have no network; or there is no such
+            teacher.
         TrdlabError: the run does not fit into what is free.
     """
+    from trdlab.deep.lessons import Levels
     from trdlab.deep.memory import available_memory
     from trdlab.policies.weights import read_weights
 
     check_threads(settings)
-    environments = make_environments(settings)
+    candidate = find(settings) if find and settings.teacher else None
+    if candidate is not None:
+        settings = candidate.settled(settings)
+    environments = candidate.make(settings) if candidate else make_environments(settings)
     try:
         settings = resolved(settings, environments)
         warm_up = 4 * max(settings.batch_size, settings.width * settings.num_envs)
         begun = replace(settings, learning_starts=warm_up, capacity=20 * warm_up)
-        trainer = new_trainer(begun, environments)
+        taught = None
+        if candidate is not None:
+            if settings.offline_updates:
+                begun = replace(begun, teacher_steps=warm_up, offline_updates=1_000_000)
+            taught = candidate.teacher(settings), Levels(1.0, 0.0)
+        trainer = new_trainer(begun, environments, taught)
         if settings.weights:
             trainer.begin_with(read_weights(settings.weights))
+        before = _seconds_before(trainer, settings, warm_up)
         acting = _steps_per_second(trainer, until=warm_up, at_most=_MEASURED_SECONDS)
-        while trainer.learner.num_updates < 2:  # what PyTorch does once
+        first_updates = trainer.learner.num_updates + 2
+        while trainer.learner.num_updates < first_updates:  # what PyTorch does once
             trainer.step()
         # ε is 1 in the beginning; what acts greedily must look at the network
         trainer.settings = replace(begun, epsilon_start=settings.epsilon_end)
         learning = _steps_per_second(trainer, until=None, at_most=_MEASURED_SECONDS)
         first = min(settings.learning_starts, settings.agent_steps)
-        seconds = first / acting + (settings.agent_steps - first) / learning
+        seconds = before + first / acting + (settings.agent_steps - first) / learning
         memory = memory_of(settings, environments, _measured_frame(environments, trainer))
         return Plan(settings, memory, available_memory(), seconds, learning)
     finally:
@@ -201,13 +230,25 @@ def _measured_frame(environments: Environments, trainer: "Trainer") -> float | N
     return trainer.memory.bytes_per_frame if compressed else None
 
 
+def _seconds_before(trainer: "Trainer", settings: TrainSettings, steps: int) -> float:
+    """Returns what a run takes before its agent acts, and goes there in miniature."""
+    if trainer.lessons is None or not settings.offline_updates:
+        return 0.0
+    teacher = _steps_per_second(trainer, until=steps, at_most=math.inf)
+    offline = _steps_per_second(trainer, until=None, at_most=_MEASURED_SECONDS)
+    done = trainer.lessons.offline_updates + 1
+    trainer.lessons.settings = replace(trainer.lessons.settings, offline_updates=done)
+    trainer.step()
+    return settings.teacher_steps / teacher + settings.offline_updates / offline
+
+
 def _steps_per_second(trainer: "Trainer", *, until: int | None, at_most: float) -> float:
-    begun, before = time.perf_counter(), trainer.agent_steps
+    begun, before = time.perf_counter(), trainer.clock
     while (passed := time.perf_counter() - begun) < at_most:
-        if until is not None and trainer.agent_steps >= until:
+        if until is not None and trainer.clock - before >= until:
             break
         trainer.step()
-    return (trainer.agent_steps - before) / max(passed, 1e-9)
+    return (trainer.clock - before) / max(passed, 1e-9)
 
 
 def _for_atari(arguments: dict[str, Any]) -> dict[str, Any]:

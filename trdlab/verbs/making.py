@@ -156,13 +156,15 @@ def train(
         out: the run's folder; by default a new one in `runs`.
         on_metrics: told of the score and the loss, now and then.
         settings: single ones in place of the preset's, by the names that `trdlab train` gives them,
-            such as `agent_steps=20_000`, `horizon=10`, `hidden=[64]`.
+            such as `agent_steps=20_000`, `horizon=10`, `hidden=[64]`, or `teacher="ppo.zip"`.
 
     Raises:
-        InputError: there is no such environment, preset or setting, or a value cannot be used.
+        InputError: there is no such environment, preset or setting, a value cannot be used, or the
+            teacher is not clearly better than random actions.
         OutputError: the folder exists, or cannot be written.
     """
     from trdlab.agents.naming import find_agent
+    from trdlab.agents.teachers import find_teacher
     from trdlab.training.run import begin, carry_on
     from trdlab.training.setup import read_settings
 
@@ -175,7 +177,7 @@ def train(
     keys = {"horizon": "N", "width": "w"}
     given = {keys.get(key, key): value for key, value in settings.items()}
     chosen = read_settings(kind or _kind_of(env), env, preset, None, given)
-    with begin(chosen, None if out is None else Path(out)) as run:
+    with begin(chosen, None if out is None else Path(out), find=find_teacher) as run:
         carry_on(run, on_metrics=on_metrics)
         path = run.folder.path
     return find_agent(str(path))

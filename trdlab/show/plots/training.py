@@ -24,10 +24,11 @@ def learning_curves(
     Args:
         ax: where to draw.
         runs: lines of metrics (see `trdlab.runs.read_metrics`) by what to call the run.
-        value: which metric; lines that do not have it are left out.
+        value: which metric; lines that do not have it are left out, and those of a teacher.
     """
     for i, (name, rows) in enumerate(runs.items()):
-        told = [(row["agent_steps"], row[value]) for row in rows if row.get(value) is not None]
+        own = [row for row in rows if row.get("phase", "online") == "online"]
+        told = [(row["agent_steps"], row[value]) for row in own if row.get(value) is not None]
         steps, values = zip(*told, strict=True) if told else ((), ())
         shade, marker = _SHADES(i / max(len(runs) - 1, 1)), "o" if len(told) == 1 else ""
         ax.plot(steps, values, _LINES[i % 4], color=shade, marker=marker, label=name)

@@ -39,7 +39,7 @@ AXIS = TimeAxis(0.95, 8)
 METHODS: tuple[Method, ...] = ("mixed", "regression", "td")
 FUTURE = Future("the given policy")
 UNPAID = "unpaid end"
-SHARE = {"mixed": 0.3, "td": 0.3, "regression": 0.1}
+SHARE = {"mixed": 0.3, "td": 0.3, "regression": 0.2}
 """Of forced actions: what comes after the next one is of no use for regression."""
 FORCED = 0.1
 """The share of forced actions where costs are measured."""
@@ -100,7 +100,7 @@ def errors(
         experience,
         gym.spaces.Discrete(mdp.num_states),
         AXIS,
-        FitSettings(method, batch_size=512, most_updates=8_000, seed=seed),
+        FitSettings(method, batch_size=512, most_updates=16_000, seed=seed),
         names=tuple(outcomes(parts)),
         parts=tuple(parts),
     )

@@ -29,7 +29,6 @@ from trdlab.time_axis import TimeAxis
 _RARE = 0.05  # of the most that came: so small the scale of what is rare can be
 _FALLS = 5  # times that the learning rate falls before learning stops
 _FALL = 0.3  # what is left of it each time
-_GAIN = 1e-3  # of the held-out error: it has to fall by so much to count as falling
 _NOTHING = 1e-3  # of what came: where it varies by less, there is nothing to predict
 _CHUNK = 4096  # rows that a network is asked about at once
 _LAG = 1e-2  # of what is expected: so much the target network may lag behind before it counts
@@ -102,7 +101,9 @@ class Fit:
         self._best_weights = deepcopy(self.network.state_dict())
         self._waited = self._falls = 0
         self._known = self._held_out()
-        self._settled = self._syncs() * self.settings.sync_every
+        once = len(self._learned) // self.settings.batch_size  # updates until all has been drawn
+        settled = max(self._syncs() * self.settings.sync_every, once)
+        self._settled = min(settled, self.settings.most_updates // 2)
 
     @property
     def done(self) -> bool:
@@ -112,16 +113,17 @@ class Fit:
     def learn(self) -> FitProgress:
         """Learns until the next look at the held-out error, and remembers the best network.
 
-        Where that has not become better for long, learning goes on from the best one, slower. What
-        is expected of what is not known has to settle first, and is no part of that error.
+        Where that has not become better for long, learning goes on from the best one, slower. First
+        every step has to be drawn once, on average: what is done seldom hardly counts in that
+        error. And what is expected of what is not known has to settle: it is no part of it.
         """
         for _ in range(self.settings.check_every):
             self.update()
         error, is_settling = self.error(), self.num_updates < self._settled
-        is_gain = error < self.best * (1.0 - _GAIN) or is_settling
+        self._waited += 1
         if error < self.best or is_settling:
             self.best, self._best_weights = error, deepcopy(self.network.state_dict())
-        self._waited = 0 if is_gain else self._waited + 1
+            self._waited = 0
         if self._waited > self.settings.patience:
             self.network.load_state_dict(self._best_weights)
             self._waited, self._falls = 0, self._falls + 1

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from trdlab.arrays import BoolArray, FloatArray
+from trdlab.arrays import BoolArray, FloatArray, IntArray
 from trdlab.deep.experience import Experience
 from trdlab.environments.outcomes import check_parts
 from trdlab.estimator import Outlook
@@ -20,6 +20,8 @@ from trdlab.time_axis import TimeAxis
 Kind = Literal["reward", "part", "value", "square", "running", "event", "ending", "amount"]
 FEW = 3
 """So many different rewards besides 0, and the chance of each is told."""
+
+_RARE = 0.05  # of the most that came: so small the scale of what is rare can be
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,38 @@ def groups_of(
                 column = total(given, axis.gamma)
         columns.append(column)
     return np.column_stack(columns)
+
+
+def sizes_of(
+    experience: Experience, rows: IntArray, groups: FloatArray, axis: TimeAxis
+) -> tuple[FloatArray, FloatArray]:
+    """Returns the mean of what came after some steps and its deviation, `[C, N+1]` each.
+
+    Of the residual they are what it would be, and its size, if rewards went on as they came. A
+    deviation is no less than a part of the most that ever came: else the few steps before something
+    rare would teach so much at once that all else is forgotten.
+
+    Args:
+        experience: what a policy did.
+        rows: `[K]`, the numbers of the steps.
+        groups: `[M, C]`, see `groups_of`.
+        axis: γ, N and w.
+    """
+    ahead = experience.ahead(rows, axis, groups)
+    known = ahead.known(axis)[:, None]  # [K, 1, N]
+    came = np.where(known, ahead.came[..., : axis.horizon], 0.0)  # [K, C, N]
+    count = np.maximum(known.sum(axis=0), 1)  # [1, N]
+    mean = came.sum(axis=0) / count
+    deviation = np.sqrt((np.where(known, came - mean, 0.0) ** 2).sum(axis=0) / count)  # [C, N]
+    length = np.mean(experience.last[rows] - rows)  # steps that were still to come
+    most_groups = 1.0 / (1.0 - axis.gamma**axis.width)
+    left = min(most_groups, max(length / axis.width, 1.0)) * axis.discounts[-1]
+    paid = groups[rows]  # [K, C]
+    middle = np.column_stack([mean, left * paid.mean(axis=0)])
+    scale = np.column_stack([deviation, left * np.abs(paid).mean(axis=0)])
+    most = np.abs(groups[experience.steps]).max(axis=0)  # [C]
+    least = np.maximum(_RARE * most[:, None] * axis.discounts, 1e-30)  # [C, N+1]
+    return middle, np.asarray(np.maximum(scale, least))
 
 
 def within(channels: Channels, components: FloatArray, possible: FloatArray) -> FloatArray:

@@ -7,14 +7,15 @@ episode was cut off, or another action was forced meanwhile, is expected by the 
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
 import torch
+from torch.optim.swa_utils import AveragedModel
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.deep.channels import channels_of, groups_of
+from trdlab.deep.channels import channels_of, groups_of, sizes_of
 from trdlab.deep.estimator import NetworkEstimator
 from trdlab.deep.experience import FAR, Ahead, Experience
 from trdlab.deep.fit_settings import FitProgress, FitSettings
@@ -26,8 +27,8 @@ from trdlab.estimator import Future
 from trdlab.rollouts.realised import Samples
 from trdlab.time_axis import TimeAxis
 
-_RARE = 0.05  # of the most that came: so small the scale of what is rare can be
-_FALLS = 5  # times that the learning rate falls before learning stops
+_BETWEEN = 10  # updates between two networks of which the mean is taken
+_FALLS = 3  # times that the learning rate falls before learning stops
 _FALL = 0.3  # what is left of it each time
 _NOTHING = 1e-3  # of what came: where it varies by less, there is nothing to predict
 _CHUNK = 4096  # rows that a network is asked about at once
@@ -79,10 +80,11 @@ class Fit:
         usual = () if is_table else (256, 256)
         hidden = usual if self.settings.hidden is None else self.settings.hidden
         self._learning_rate = self.settings.learning_rate or (1e-2 if is_table else 1e-3)
-        rows = self.num_actions * len(self.channels)
-        self.network = build_network(space, rows, axis, seed=self.settings.seed, hidden=hidden)
+        outputs = self.num_actions * len(self.channels)
+        self.network = build_network(space, outputs, axis, seed=self.settings.seed, hidden=hidden)
         self._learned, self._kept = self._split()
-        middle, self.scale = self._sizes()
+        rows = self.rng.choice(self._learned, min(len(self._learned), 20_000), replace=False)
+        middle, self.scale = sizes_of(experience, rows, self._groups, axis)
         with torch.no_grad():  # learning begins at the best constant
             bias = torch.from_numpy(middle / self.scale).flatten()  # [C·(N+1)]
             self.network.head.bias.copy_(bias.repeat(self.num_actions))
@@ -93,6 +95,7 @@ class Fit:
         if isinstance(self.network, VectorNetwork) and self.network.num_states is None:
             self.network.standardise(experience.frames[self._learned])
         self.target_network = deepcopy(self.network)
+        self._mean = AveragedModel(self.network)  # of the networks since learning became slower
         self.optimizer = torch.optim.Adam(
             self.network.parameters(), lr=self._learning_rate, fused=True
         )
@@ -113,20 +116,27 @@ class Fit:
     def learn(self) -> FitProgress:
         """Learns until the next look at the held-out error, and remembers the best network.
 
-        Where that has not become better for long, learning goes on from the best one, slower. First
-        every step has to be drawn once, on average: what is done seldom hardly counts in that
-        error. And what is expected of what is not known has to settle: it is no part of it.
+        That is a mean of many networks, in which the noise of their batches evens out. Where it has
+        not become better for long, learning goes on from it, slower, and so does the mean. First
+        every step has to be drawn once: what is done seldom hardly counts in that error. And what
+        is expected of what is not known has to settle: it is no part of it.
         """
+        is_settling = self.num_updates < self._settled
+        if is_settling:
+            self._mean.n_averaged.zero_()
         for _ in range(self.settings.check_every):
             self.update()
-        error, is_settling = self.error(), self.num_updates < self._settled
+            if self.num_updates % _BETWEEN == 0:
+                self._mean.update_parameters(self.network)
+        error = self.error()
         self._waited += 1
         if error < self.best or is_settling:
-            self.best, self._best_weights = error, deepcopy(self.network.state_dict())
+            self.best, self._best_weights = error, deepcopy(self._steady.state_dict())
             self._waited = 0
         if self._waited > self.settings.patience:
             self.network.load_state_dict(self._best_weights)
             self._waited, self._falls = 0, self._falls + 1
+            self._mean.n_averaged.zero_()
             self._set_learning_rate()
         share = max(self._falls / (_FALLS + 1), self.num_updates / self.settings.most_updates)
         return FitProgress(self.num_updates, error, self.best, min(share, 1.0))
@@ -148,6 +158,8 @@ class Fit:
             "rng": self.rng.bit_generator.state,
             "network": arrays_of(self.network.state_dict()),
             "best_weights": arrays_of(self._best_weights),
+            "mean": arrays_of(self._steady.state_dict()),
+            "averaged": int(self._mean.n_averaged),
             "optimizer": moments_of(self.optimizer, self.network),
         }
 
@@ -160,8 +172,10 @@ class Fit:
         self.num_updates, self.best = state["num_updates"], state["best"]
         self._waited, self._falls = state["waited"], state["falls"]
         self.rng.bit_generator.state = state["rng"]
-        load_weights(self.network, state["best_weights"])
-        self._best_weights = deepcopy(self.network.state_dict())
+        load_weights(self._steady, state["best_weights"])
+        self._best_weights = deepcopy(self._steady.state_dict())
+        load_weights(self._steady, state["mean"])
+        self._mean.n_averaged.fill_(state["averaged"])
         load_weights(self.network, state["network"])
         load_moments(self.optimizer, self.network, state["optimizer"])
         self._set_learning_rate()
@@ -187,7 +201,7 @@ class Fit:
     def error(self) -> float:
         """Returns the held-out error (see `FitProgress`)."""
         rows, came, known, constant = self._known
-        apart = np.where(known, self._told(rows) - came, 0.0)
+        apart = np.where(known, self._told(self._steady, rows) - came, 0.0)
         size = np.where(known, came - constant, 0.0)
         least = _NOTHING * (np.where(known, came, 0.0) ** 2).sum()
         return float((apart**2).sum() / max((size**2).sum(), least, 1e-30))
@@ -197,10 +211,7 @@ class Fit:
         rows, came, known, _ = self._known
         order = np.argsort(rows)
         numbers = np.unique(self.experience.last[rows[order]], return_inverse=True)[1]
-        kept = deepcopy(self.network.state_dict())
-        self.network.load_state_dict(self._best_weights)
-        told = np.clip(self._told(rows) * self.scale, *self.possible)  # [K, C, N+1]
-        self.network.load_state_dict(kept)
+        told = np.clip(self._told(self._best(), rows) * self.scale, *self.possible)  # [K, C, N+1]
         flags = np.broadcast_to(known[:, 0], told[:, 0].shape)[order]  # [K, N+1]
         return tuple(
             Samples(
@@ -216,8 +227,7 @@ class Fit:
 
     def estimator(self, future: Future) -> NetworkEstimator:
         """Returns the best network as an Estimator, its outputs in discounted reward."""
-        network = deepcopy(self.network)
-        network.load_state_dict(self._best_weights)
+        network = self._best()
         scale = torch.as_tensor(self.scale, dtype=torch.float32).flatten()  # [C·(N+1)]
         rows = scale.repeat(self.num_actions)  # [A·C·(N+1)]
         with torch.no_grad():
@@ -227,12 +237,21 @@ class Fit:
             network, self.axis, future, channels=self.channels, possible=self.possible
         )
 
-    def _told(self, rows: IntArray) -> FloatArray:
+    @property
+    def _steady(self) -> DecompositionNetwork:
+        return cast(DecompositionNetwork, self._mean.module)
+
+    def _best(self) -> DecompositionNetwork:
+        network = deepcopy(self.network)
+        network.load_state_dict(self._best_weights)
+        return network
+
+    def _told(self, network: DecompositionNetwork, rows: IntArray) -> FloatArray:
         """Returns `[K, C, N+1]` of the actions taken, as shares of the scale."""
         parts = []
         with torch.inference_mode():
             for part in np.array_split(rows, -(-len(rows) // _CHUNK)):
-                told = self._components(self.network, part)  # [K, A, C, N+1]
+                told = self._components(network, part)  # [K, A, C, N+1]
                 parts.append(told[range(len(part)), self._actions(part)].numpy())
         return np.concatenate(parts)
 
@@ -293,31 +312,6 @@ class Fit:
         kept = self.rng.choice(lasts, count, replace=False)
         is_kept = np.isin(of.last[of.steps], kept)
         return of.steps[~is_kept], of.steps[is_kept]
-
-    def _sizes(self) -> tuple[FloatArray, FloatArray]:
-        """Returns the mean of what came and its deviation, `[C, N+1]` each.
-
-        Of the residual they are what it would be, and its size, if rewards went on as they came. A
-        deviation is no less than a part of the most that ever came: else the few steps before
-        something rare would teach so much at once that all else is forgotten.
-        """
-        axis = self.axis
-        rows = self.rng.choice(self._learned, min(len(self._learned), 20_000), replace=False)
-        ahead = self.experience.ahead(rows, axis, self._groups)
-        known = ahead.known(axis)[:, None]  # [K, 1, N]
-        came = np.where(known, ahead.came[..., : axis.horizon], 0.0)  # [K, C, N]
-        count = np.maximum(known.sum(axis=0), 1)  # [1, N]
-        mean = came.sum(axis=0) / count
-        deviation = np.sqrt((np.where(known, came - mean, 0.0) ** 2).sum(axis=0) / count)  # [C, N]
-        length = np.mean(self.experience.last[rows] - rows)  # steps that were still to come
-        most_groups = 1.0 / (1.0 - axis.gamma**axis.width)
-        groups = min(most_groups, max(length / axis.width, 1.0)) * axis.discounts[-1]
-        paid = self._groups[rows]  # [K, C]
-        middle = np.column_stack([mean, groups * paid.mean(axis=0)])
-        scale = np.column_stack([deviation, groups * np.abs(paid).mean(axis=0)])
-        most = np.abs(self._groups[self.experience.steps]).max(axis=0)  # [C]
-        least = np.maximum(_RARE * most[:, None] * axis.discounts, 1e-30)  # [C, N+1]
-        return middle, np.asarray(np.maximum(scale, least))
 
     def _syncs(self) -> int:
         """Returns how often the target network is copied until what is expected has settled."""

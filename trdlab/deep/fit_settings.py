@@ -38,7 +38,7 @@ class FitSettings:
     learning_rate: float | None = None
     batch_size: int = 256
     check_every: int = 200
-    patience: int = 3
+    patience: int = 5
     most_updates: int = 20_000
     sync_every: int = 50
     held_out: float = 0.1

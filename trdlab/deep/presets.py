@@ -103,6 +103,8 @@ PRESETS["gym"] |= {
             "learning_rate_end": 0.0,
             "target_sync_updates": 150,
             "capacity": 50_000,
+            "checkpoint_every": 5_000,  # the last network may be a worse one
+            "checkpoint_episodes": 20,
         },
     ),
     "lunar-lander": (

@@ -87,7 +87,7 @@ for name, of in {"draws": agent, "takes the likeliest": steady}.items():
 fitted = trdlab.fit(
     agent,
     horizon=30,
-    steps=25_000,
+    steps=40_000,
     outcomes={"fall": lambda step: step.terminated},
 )
 print(fitted.estimator.time_axis)

@@ -274,6 +274,47 @@ def test_without_components_the_value_of_the_policy_is_learned():
     np.testing.assert_allclose(told, true, atol=0.03 * np.abs(true).max())
 
 
+def test_what_is_told_is_a_mean_of_networks_however_often_the_fit_looks():
+    how = FitSettings(check_every=5, sync_every=5, most_updates=5, learning_rate=0.01)
+    fit = Fit(played(steps=3_000), gym.spaces.Discrete(4), TimeAxis(0.9, 3), how)
+    begun = fit.estimator(FUTURE).decompose(np.arange(3)).components
+    fit.learn()
+    told = fit.estimator(FUTURE).decompose(np.arange(3)).components
+    assert not np.array_equal(told, begun), "five updates have been learned from"
+
+    often = FitSettings(check_every=40, sync_every=40, most_updates=80, learning_rate=0.01)
+    fit = Fit(played(steps=3_000), gym.spaces.Discrete(4), TimeAxis(0.9, 3), often)
+    seen = []
+    update = fit.update
+
+    def noted() -> float:
+        loss = update()
+        if fit.num_updates in (10, 20, 30, 40):
+            seen.append(fit.network.head.weight.detach().clone())
+        return loss
+
+    fit.update = noted  # type: ignore[method-assign]
+    fit.learn()
+    sizes = torch.as_tensor(fit.scale, dtype=torch.float32).flatten().repeat(fit.num_actions)
+    mean = torch.stack(seen).mean(dim=0) * sizes[:, None]  # in discounted reward
+    got = fit.estimator(FUTURE).network.head.weight
+    torch.testing.assert_close(got, mean, rtol=1e-5, atol=1e-6)
+
+
+def test_no_learning_gets_slower_before_every_step_was_drawn_once():
+    how = FitSettings(
+        batch_size=16, check_every=50, patience=1, most_updates=20_000, learning_rate=1e-12
+    )  # with which nothing is ever gained
+    fit = Fit(played(steps=12_000), gym.spaces.Discrete(4), TimeAxis(0.9, 3), how)
+    rates = []
+    while not fit.done:
+        fit.learn()
+        rates.append((fit.num_updates, fit.optimizer.param_groups[0]["lr"]))
+    steps = len(fit.experience.steps)
+    first_slower = next(updates for updates, rate in rates if rate < rates[0][1])
+    assert first_slower * how.batch_size > 0.85 * steps, "nine of ten episodes are learned from"
+
+
 def test_the_same_seed_learns_the_same_bits():
     def weights() -> bytes:
         fit = Fit(played(steps=3_000), gym.spaces.Discrete(4), TimeAxis(0.9, 3))

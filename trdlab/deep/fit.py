@@ -85,7 +85,7 @@ class Fit:
         self._learned, self._kept = self._split()
         rows = self.rng.choice(self._learned, min(len(self._learned), 20_000), replace=False)
         middle, self.scale = sizes_of(experience, rows, self._groups, axis)
-        with torch.no_grad():  # learning begins at the best constant
+        with torch.no_grad():  # learning begins near the best constant
             bias = torch.from_numpy(middle / self.scale).flatten()  # [C·(N+1)]
             self.network.head.bias.copy_(bias.repeat(self.num_actions))
         paid = self._groups[experience.steps]
@@ -122,11 +122,12 @@ class Fit:
         is expected of what is not known has to settle: it is no part of it.
         """
         is_settling = self.num_updates < self._settled
+        between = min(_BETWEEN, self.settings.check_every)
         if is_settling:
             self._mean.n_averaged.zero_()
         for _ in range(self.settings.check_every):
             self.update()
-            if self.num_updates % _BETWEEN == 0:
+            if self.num_updates % between == 0:
                 self._mean.update_parameters(self.network)
         error = self.error()
         self._waited += 1

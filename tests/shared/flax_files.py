@@ -1,34 +1,19 @@
-"""Files as flax writes them (`flax.serialization.to_bytes`), without flax or msgpack."""
+"""Files as flax writes them (`flax.serialization.to_bytes`), without flax."""
 
-import struct
 from typing import Any
 
+import msgpack
 import numpy as np
 
 
 def packed(value: Any) -> bytes:
     """Returns a value in msgpack, an array as flax's extension for it."""
-    if isinstance(value, dict):
-        parts = [packed(name) + packed(part) for name, part in value.items()]
-        return _headed(len(parts), 0x80, 16, {2: 0xDE, 4: 0xDF}) + b"".join(parts)
-    if isinstance(value, list | tuple):
-        return _headed(len(value), 0x90, 16, {2: 0xDC, 4: 0xDD}) + b"".join(map(packed, value))
-    if isinstance(value, str):
-        text = value.encode()
-        return _headed(len(text), 0xA0, 32, {1: 0xD9, 2: 0xDA, 4: 0xDB}) + text
-    if isinstance(value, bytes):
-        return _headed(len(value), 0, 0, {1: 0xC4, 2: 0xC5, 4: 0xC6}) + value
-    if isinstance(value, np.ndarray):
-        content = packed((value.shape, value.dtype.name, value.tobytes()))
-        return _headed(len(content), 0, 0, {1: 0xC7, 2: 0xC8, 4: 0xC9}) + b"\x01" + content
-    return _headed(value, 0, 128, {1: 0xCC, 2: 0xCD, 4: 0xCE, 8: 0xCF})
 
+    def extension(array: np.ndarray) -> msgpack.ExtType:
+        content = msgpack.packb((array.shape, array.dtype.name, array.tobytes()))
+        return msgpack.ExtType(1, content)
 
-def _headed(count: int, first: int, below: int, kinds: dict[int, int]) -> bytes:
-    if count < below:
-        return bytes([first + count])
-    size = next(size for size in kinds if count < 256**size)
-    return bytes([kinds[size]]) + struct.pack(f">{'_BH_I___Q'[size]}", count)
+    return bytes(msgpack.packb(value, default=extension))
 
 
 def q_network(outputs: int, seed: int = 0, side: int = 7) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from trdlab.deep.update import Batch, Learner
 from trdlab.errors import InputError, TrdlabError
 from trdlab.estimator import Future
 from trdlab.gridworld import Gridworld, load_map
-from trdlab.tabular import exact
+from trdlab.tabular import MDP, exact
 
 AXIS = TimeAxis(0.95, horizon=4)
 VECTOR = gym.spaces.Box(-np.inf, np.inf, (3,), np.float32)
@@ -50,6 +50,17 @@ def _one_thread():
     torch.set_num_threads(threads)
 
 
+def every_transition(mdp: MDP) -> Batch:
+    """Every action in every state once, where nothing is left to chance."""
+    return Batch(
+        observations=np.repeat(np.arange(mdp.num_states), mdp.num_actions),
+        actions=np.tile(np.arange(mdp.num_actions), mdp.num_states),
+        rewards=mdp.rewards,
+        discounts=AXIS.gamma * ~mdp.terminated,
+        next_observations=mdp.next_states,
+    )
+
+
 @pytest.mark.parametrize("reduction", ["sum", "mean"])
 def test_the_whole_drone_is_learned_exactly(reduction):
     """Every transition of the drone in one batch: the network reaches the exact table.
@@ -59,14 +70,7 @@ def test_the_whole_drone_is_learned_exactly(reduction):
     greedy actions keep flipping, and whole rewards change places.
     """
     mdp = Gridworld(load_map("drone")).mdp
-    states = np.repeat(np.arange(mdp.num_states), mdp.num_actions)
-    batch = Batch(
-        observations=states,
-        actions=np.tile(np.arange(mdp.num_actions), mdp.num_states),
-        rewards=mdp.rewards,
-        discounts=AXIS.gamma * ~mdp.terminated,
-        next_observations=mdp.next_states,
-    )
+    batch = every_transition(mdp)
     network = build_network(gym.spaces.Discrete(mdp.num_states), mdp.num_actions, AXIS)
     trained = Learner(
         network, UpdateSettings(learning_rate=1e-3, target_sync_updates=200, reduction=reduction)
@@ -82,14 +86,7 @@ def test_the_whole_drone_is_learned_exactly(reduction):
 def test_the_future_of_a_policy_head_is_learned_exactly():
     """A head that chooses evenly, in the drone: the components are those of that policy."""
     mdp = Gridworld(load_map("drone")).mdp
-    states = np.repeat(np.arange(mdp.num_states), mdp.num_actions)
-    batch = Batch(
-        observations=states,
-        actions=np.tile(np.arange(mdp.num_actions), mdp.num_states),
-        rewards=mdp.rewards,
-        discounts=AXIS.gamma * ~mdp.terminated,
-        next_observations=mdp.next_states,
-    )
+    batch = every_transition(mdp)
     space = gym.spaces.Discrete(mdp.num_states)
     network = build_network(space, mdp.num_actions, AXIS, policy_head=True)
     for weight in network.policy_head.parameters():

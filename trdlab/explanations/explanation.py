@@ -57,8 +57,8 @@ class Explanation(Printable):
         story: of the whole episode; None where it was not asked for.
         max_steps: after which episodes were cut off, if not before; None for never.
         missing: what is not known, and why, in sentences.
-        observation: what the agent saw at the moment, as its policy is shown it; None where nothing
-            was asked that speaks of a moment.
+        observation: what the agent's forecasts are about at the moment, as its estimator is asked;
+            None where nothing was asked that speaks of a moment.
     """
 
     agent: Agent

@@ -52,12 +52,17 @@ def train(out: Path, num_envs: int) -> list[str]:
 
 
 TEACHER = """
+import time
 import numpy as np
 
 class Balances:
-    \"\"\"Balances the pole, and remembers where it was; draws its actions.\"\"\"
+    \"\"\"Balances the pole, and remembers where it was; draws its actions.
+
+    It takes its time, so that a kill meant for its phase does not come after it.
+    \"\"\"
 
     def act(self, observations, state, begins):
+        time.sleep(0.005 * min(len(observations), 4))
         seen = observations
         before = seen if state is None else np.where(begins[:, None], seen, state[0])
         falls = seen[:, 2:3] + seen[:, 3:4] + 0.1 * (seen - before)[:, 2:3]
@@ -73,6 +78,7 @@ COLLECTED, OFFLINE = 160, 80
 def train_taught(out: Path, num_envs: int, teacher: str) -> list[str]:
     """Returns the words that begin a run which learns from a teacher with a memory."""
     options = {
+        "--env-arg": "max_episode_steps=30",
         "--teacher": teacher,
         "--teacher-steps": COLLECTED,
         "--offline-updates": OFFLINE,

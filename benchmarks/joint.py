@@ -16,6 +16,7 @@ import torch
 
 import trdlab
 from trdlab.agents.agent import Agent
+from trdlab.agents.naming import find_agent
 from trdlab.explanations.calibration.calibration import Calibration
 
 METHODS = ("mixed", "regression", "td")
@@ -29,7 +30,7 @@ def main() -> None:
     options = parser.parse_args()
     torch.set_num_threads(1)
     for path in options.runs:
-        agent = trdlab.agent(path)
+        agent = find_agent(str(path), joint=True)
         axis = agent.estimator.time_axis
         shown = sorted({0, axis.horizon // 4, axis.horizon // 2, axis.horizon - 1})
         print(f"\n{path.name}: skill at {', '.join(axis.label(k) for k in shown)}", flush=True)

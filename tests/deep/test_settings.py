@@ -239,8 +239,9 @@ def test_every_preset_can_be_used_and_says_what_it_is_for():
         ("gym", "Taxi-v3", "classic", "classic."),
         ("gym", "mine:CartPole-v1", None, "classic. None are known for mine:CartPole-v1: it may "),
         ("gym", "CartPole", None, "classic. None are known for CartPole: it may need others."),
-        ("atari", "Breakout", None, "paper."),
-        ("atari", "CartPole-v1", None, "paper."),
+        ("atari", "Breakout", None, "cpu."),
+        ("atari", "CartPole-v1", None, "cpu."),
+        ("atari", "Breakout", "paper", "paper."),
     ],
 )
 def test_an_environment_that_is_known_has_settings_of_its_own(kind, env, name, said):
@@ -250,7 +251,7 @@ def test_an_environment_that_is_known_has_settings_of_its_own(kind, env, name, s
 
 
 def test_the_paper_s_settings():
-    paper = preset("atari", "Breakout")
+    paper = preset("atari", "Breakout", "paper")
     assert (paper.horizon, paper.width, paper.gamma, paper.batch_size) == (40, 1, 0.99, 32)
     assert (paper.update_every, paper.learning_starts) == (4, 80_000)
     assert (paper.clip_rewards, paper.life_loss_ends) == (True, True)

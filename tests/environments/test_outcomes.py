@@ -51,7 +51,7 @@ def test_what_no_step_has_told_is_named_with_what_was_there():
 
 @pytest.mark.parametrize("what", ["fuel", "info.", 3, None])
 def test_what_is_no_outcome_is_refused(what: object):
-    with pytest.raises(InputError, match=r"Give a function of a step, or a place such as info"):
+    with pytest.raises(InputError, match=r"Give a function of a step, a place such as info"):
         Outcomes({"fuel": what})  # type: ignore[dict-item]
 
 

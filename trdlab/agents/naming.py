@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from trdlab.agents.agent import Agent
 from trdlab.agents.given import acting_agent, agent_of, model_agent
@@ -23,16 +23,20 @@ from trdlab.environments.making import check_imported
 from trdlab.environments.naming import are_own, is_numbered
 from trdlab.errors import InputError
 from trdlab.gridworld import map_names
-from trdlab.policies import Policy, acting
+from trdlab.policies import EpsilonGreedy, Policy, acting
 from trdlab.policies.adapted import About, games_for
 from trdlab.policies.files import Options
 from trdlab.policies.functions import PYTHON, from_python
 from trdlab.policies.registry import read_policy
 from trdlab.runs import RunFolder, find_checkpoint
 from trdlab.runs.folder import is_fit
+from trdlab.runs.pretrained import is_shipped
 from trdlab.tabular.toytext import toy_text_ids
 from trdlab.time_axis import TimeAxis
-from trdlab.training.fitted import load_fit
+from trdlab.training.fitted import Plan, load_fit, run_of
+
+if TYPE_CHECKING:
+    from trdlab.deep.estimator import NetworkEstimator
 
 _OWN_AXIS = "is a run with its own γ, N and w."
 _UNKNOWN_AXIS = "has γ, N and w of its own, or gets them when it is fitted."
@@ -47,15 +51,16 @@ def find_agent(
     width: int | None = None,
     env: Where | None = None,
     env_arguments: Sequence[str] = (),
+    joint: bool = False,
 ) -> Agent:
     """Returns an agent by its name.
 
-    That is a run's folder, or `RUN@STEP` or `RUN@best` for another checkpoint of it; the folder of
-    a fit; for the exact table of a model, `gridworld:NAME`, a map file, or `tabular:ENV_ID`, each
-    with what to make it with after commas, such as `gridworld:ledge,slip=0.2`; a file of an agent
-    that another library trained, likewise with what it does not say, such as
-    `ppo.zip,activation=relu,greedy=true` (see `Options`); or `python:FILE.py:FUNCTION`, whose
-    function makes one.
+    That is a run's folder, or `RUN@STEP` or `RUN@best` for another checkpoint of it; a run that
+    comes with trdlab, such as `pretrained:Breakout`; the folder of a fit; for the exact table of a
+    model, `gridworld:NAME`, a map file, or `tabular:ENV_ID`, each with what to make it with after
+    commas, such as `gridworld:ledge,slip=0.2`; a file of an agent that another library trained,
+    likewise with what it does not say, such as `ppo.zip,activation=relu,greedy=true` (see
+    `Options`); or `python:FILE.py:FUNCTION`, whose function makes one.
 
     Args:
         name: of the agent.
@@ -64,6 +69,8 @@ def find_agent(
         width: w of an exact table, by default 1.
         env: an environment to act in instead of its own (see `find_place`).
         env_arguments: what to make that one with, as `KEY=VALUE`.
+        joint: of a run, the components as they were learned with the policy, though it was fitted
+            when its training was over.
 
     Raises:
         InputError: there is no such agent, or something does not fit it.
@@ -81,7 +88,7 @@ def find_agent(
         return _read(name, env, env_arguments)
     if is_fit(Path(name)):
         return _fitted(name, env, env_arguments)
-    return _run(name, env, env_arguments)
+    return _run(name, env, env_arguments, joint=joint)
 
 
 def gridworld_agent(map_name: str, time_axis: TimeAxis, **where: Any) -> Agent:
@@ -106,9 +113,9 @@ def _exact(name: str, env: Where | None, env_arguments: Sequence[str], axis: Tim
     return replace(agent, origin=place.origin(called, axis, away=True))
 
 
-def _run(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
+def _run(name: str, env: Where | None, env_arguments: Sequence[str], *, joint: bool) -> Agent:
     """Returns the agent of a run, or of a checkpoint of it, in its own environments or others."""
-    from trdlab.training.loading import interface_of, load, run_settings
+    from trdlab.training.loading import interface_of, load, own_fit, run_settings
     from trdlab.training.machine import use_threads
 
     path, step = find_checkpoint(name)
@@ -117,7 +124,7 @@ def _run(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
     if env_arguments and env is None:
         raise InputError("The run says what its environment is made with.", "Give `env` too.")
     use_threads(settings)
-    estimator = load(path, step)
+    estimator = load(path, step, joint=True)
     if env is None:
         check_imported(settings.env)
         place = place_of(settings)
@@ -128,21 +135,29 @@ def _run(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
     known.check_fits(found, place.name)
     at = "" if step is None else f"@{step}"
     module = settings.env.rpartition(":")[0]
-    return Agent(
+    called = name if is_shipped(path) else f"{path}{at}"
+    agent = Agent(
         name=f"{folder.path.name}{at}",
         estimator=estimator,
         action_names=(known if is_numbered(found.action_names) else found).action_names,
         make=place.make,
         policy=estimator if isinstance(estimator, Policy) else None,
         seconds_per_step=found.seconds_per_step,
-        origin=place.origin(f"{path}{at}", None, away=env is not None, module=module),
+        origin=place.origin(called, None, away=env is not None, module=module),
         copying=place.copying,
     )
+    own = None if joint else own_fit(path, step)
+    return agent if own is None else _with_fit(agent, *load_fit(own)[::2])
 
 
 def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
     """Returns the agent of a fit, in a folder: who was fitted, with what was learned of it."""
     estimator, interface, whose = load_fit(Path(name))
+    of_run = run_of(Path(name))
+    if of_run is not None:  # it goes wherever the run goes
+        where: dict[str, Any] = {"env": env, "env_arguments": env_arguments, "joint": True}
+        agent = find_agent(f"{of_run[0]}@{of_run[1]}", **where)
+        return _with_fit(agent, estimator, whose)
     if whose.agent is None:
         raise InputError(
             f"'{name}' was fitted to an agent without a name.",
@@ -157,9 +172,19 @@ def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent
     if is_own and is_renamed and len(names) == len(of.action_names):
         of = of.named(names)
     interface.check_fits(of.interface, str(env or whose.agent))
-    policy = acting(of.policy or of.estimator)
     origin = of.origin and replace(of.origin, name=name, time_axis=None)
-    return replace(of, name=Path(name).name, estimator=estimator, policy=policy, origin=origin)
+    return replace(_with_fit(of, estimator, whose), name=Path(name).name, origin=origin)
+
+
+def _with_fit(of: Agent, estimator: "NetworkEstimator", whose: Plan) -> Agent:
+    """Returns an agent whose future a fit tells, as `load_fit` has read it."""
+    policy = acting(of.policy or of.estimator)
+    if whose.features:
+        from trdlab.deep.features import trunk_of, upon
+
+        estimator = upon(trunk_of(policy), estimator)
+    acts = EpsilonGreedy(policy, whose.epsilon) if whose.epsilon else policy
+    return replace(of, estimator=estimator, policy=acts)
 
 
 def _made(name: str, env: Where | None, env_arguments: Sequence[str], axis: TimeAxis) -> Agent:

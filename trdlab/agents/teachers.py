@@ -10,11 +10,12 @@ from trdlab.errors import InputError
 from trdlab.policies import Policy, acting
 from trdlab.policies.adapted import games_for
 from trdlab.policies.functions import PYTHON
-from trdlab.runs import RunFolder, checkpoint_steps, find_checkpoint
+from trdlab.runs import RunFolder, find_checkpoint
 from trdlab.runs.folder import is_fit, is_run
 from trdlab.runs.keeping import all_saved
+from trdlab.runs.pretrained import is_shipped
 from trdlab.tabular import ExactTable
-from trdlab.training.loading import agent_step
+from trdlab.training.loading import chosen_step
 from trdlab.training.teaching import Candidate
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def find_teacher(settings: "TrainSettings") -> Candidate:
         InputError: there is no such agent, or it does not fit there.
     """
     name, file = _placed(str(settings.teacher))
-    agent = find_agent(name, env=settings.env, env_arguments=settings.env_arg)
+    agent = find_agent(name, env=settings.env, env_arguments=settings.env_arg, joint=True)
     policy = acting(agent.policy or agent.estimator)
     by_estimate = agent.policy is None or isinstance(agent.estimator, ExactTable)
     if by_estimate:
@@ -73,8 +74,8 @@ def _placed(name: str) -> tuple[str, Path | None]:
         return str(path.resolve()), None
     folder = RunFolder.open(path.resolve())
     if step is None:  # it may be trained further meanwhile, and its agent become another one
-        step = agent_step(folder) or max(checkpoint_steps(folder), default=None)
+        step = chosen_step(folder)
     saved = [of.folder for of in all_saved(folder) if of.step == step]
-    if step is None or not saved:
+    if not saved:
         raise InputError(f"The teacher '{name}' has no checkpoint yet.", "Train it first.")
-    return f"{folder.path}@{step}", saved[-1] / _WEIGHTS
+    return name if is_shipped(path) else f"{folder.path}@{step}", saved[-1] / _WEIGHTS

@@ -195,6 +195,11 @@ class AtariEnvironments:
                 )
         return copies
 
+    @property
+    def has_lives(self) -> bool:
+        """Whether lives can be lost in the game; known once it has begun."""
+        return bool(self._lives.any())
+
     def close(self) -> None:
         """Nothing: ale-py's threads end with the object."""
 

@@ -2,6 +2,7 @@
 
 import re
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -41,6 +42,19 @@ def fit(
     share: Annotated[
         float, typer.Option("--share", help="Of its actions that are forced.", min=0, max=1)
     ] = 0.1,
+    epsilon: Annotated[
+        float,
+        typer.Option(
+            "--epsilon", help="Chance of any action at random, as a part of it.", min=0, max=1
+        ),
+    ] = 0.0,
+    features: Annotated[
+        bool,
+        typer.Option(
+            "--features",
+            help="Learn from what the last layer of its own network reads: of trdlab's runs.",
+        ),
+    ] = False,
     method: Annotated[
         str, typer.Option("--method", help="mixed, regression or td (see the guide).")
     ] = "mixed",
@@ -90,6 +104,8 @@ def fit(
         gamma=gamma,
         steps=steps,
         share=share,
+        epsilon=epsilon,
+        features=features,
         seed=seed,
         seconds=limit_seconds,
         method=method,
@@ -101,8 +117,11 @@ def fit(
 def go_on(path: Path) -> None:
     """Goes on with a fit that was stopped."""
     from trdlab.runs import RunFolder
-    from trdlab.training.fitted import Plan
+    from trdlab.training.fitted import Plan, run_of
 
+    if (of_run := run_of(path)) is not None:
+        fit_run(of_run[0])
+        return
     plan = Plan.from_config(RunFolder.open(path).config)
     if plan.agent is None or plan.has_functions:
         what = "agent" if plan.agent is None else "outcomes"
@@ -114,8 +133,32 @@ def go_on(path: Path) -> None:
     _fit(found, path, **plan.arguments)
 
 
+def fit_run(path: Path) -> None:
+    """Fits the agent of a run, in its folder, and says how far that can be trusted."""
+    from trdlab.runs import RunFolder
+    from trdlab.training.fitted import fit_path
+    from trdlab.training.loading import chosen_step
+    from trdlab.verbs.making import fit_run as fit_in_folder
+
+    out = fit_path(path, chosen_step(RunFolder.open(path)))
+    _told(lambda **watched: fit_in_folder(path, **watched), out, path)
+
+
 def _fit(found: "Agent", out: Path, **how: Any) -> None:
     """Fits, and says how far that can be trusted."""
+    import trdlab
+
+    _told(lambda **watched: trdlab.fit(found, out=out, **watched, **how), out, out)
+
+
+def _told(fitted_by: Callable[..., "Agent"], out: Path, name: Path) -> None:
+    """Fits, and says how far that can be trusted.
+
+    Args:
+        fitted_by: does it, and shows how far it is.
+        out: where it is kept.
+        name: by which the agent is explained.
+    """
     import trdlab
     from trdlab.cli.progress import stopping
     from trdlab.explanations.calibration import claims
@@ -126,17 +169,19 @@ def _fit(found: "Agent", out: Path, **how: Any) -> None:
     errors, began = common.errors(), time.monotonic()
     with stopping() as stop:
         try:
-            fitted = trdlab.fit(found, out=out, progress=True, should_stop=stop, **how)
+            fitted = fitted_by(progress=True, should_stop=stop)
         except Stopped as stopped:
             kept = is_fit(out)
-            told = f"Saved. Go on: {RunFolder.open(out).resume_command}" if kept else "Begin again."
+            again = "Begin again." if name == out else f"Go on: trdlab resume {name}"
+            told = f"Saved. Go on: {RunFolder.open(out).resume_command}" if kept else again
             errors.print(f"{stopped.cause} {told}", soft_wrap=True, markup=False)
             raise typer.Exit(stop.code or 0) from stopped
     errors.print(f"Kept: {out}", soft_wrap=True, markup=False)
     report = trdlab.calibrate(fitted)
     for claim in claims.in_brief(report):
         common.print_line(claim.sentence)
-    common.print_line(f"It took {time.monotonic() - began:.0f} s. Try: trdlab explain {out}", "dim")
+    took = f"It took {time.monotonic() - began:.0f} s."
+    common.print_line(f"{took} Try: trdlab explain {name}", "dim")
 
 
 def _agent(agent: str, env: str | None, env_arguments: list[str] | None, **how: Any) -> "Agent":

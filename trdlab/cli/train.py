@@ -10,7 +10,7 @@ from rich.console import Console
 
 from trdlab.cli import common
 from trdlab.cli.options import with_settings
-from trdlab.deep.presets import DEFAULT_PRESETS, PRESETS
+from trdlab.deep.presets import PRESETS
 
 if TYPE_CHECKING:
     from trdlab.deep.settings import Kind, TrainSettings
@@ -24,10 +24,12 @@ train = typer.Typer(help="Train a network that decomposes.", no_args_is_help=Tru
 def _presets(kind: "Kind") -> Any:
     """Returns the option that names where settings begin, with a help that lists them."""
     known = "; ".join(f"{name}: {about}" for name, (about, _) in PRESETS[kind].items())
-    own = "that of the environment, or " if kind == "gym" else ""
-    shown = f"{own}{DEFAULT_PRESETS[kind]}"
+    usual = {"gym": "that of the environment, or classic", "atari": "gpu or cpu, whatever is there"}
     return typer.Option(
-        "--preset", metavar="NAME", help=f"Settings to begin from. {known}.", show_default=shown
+        "--preset",
+        metavar="NAME",
+        help=f"Settings to begin from. {known}.",
+        show_default=usual[kind],
     )
 
 
@@ -95,15 +97,20 @@ def train_atari(
     preset: AtariPreset = None,
     config: ConfigFile = None,
     out: Out = None,
+    from_scratch: Annotated[
+        bool, typer.Option("--from-scratch", help="Learn from nobody, unless --teacher is given.")
+    ] = False,
     dry_run: DryRun = False,
     verbose: common.Verbose = False,
     given: dict[str, Any] | None = None,
 ) -> None:
     """Train on an Atari game: 84×84 grey, frame skip 4, stacks of 4.
 
-    Settings come from the preset, then from --config, then from the options.
+    On a CPU it learns from the agent that comes with trdlab, if there is one of this game. When
+    training is over, the decomposition of its policy is fitted. Settings come from the preset, then
+    from --config, then from the options; the defaults that are shown here are those of cpu.
     """
-    _train("atari", game, preset, config, out, dry_run, given or {})
+    _train("atari", game, preset, config, out, dry_run, given or {}, from_scratch=from_scratch)
 
 
 def resume(
@@ -194,12 +201,14 @@ def _train(
     out: Path | None,
     dry_run: bool,
     given: dict[str, Any],
+    *,
+    from_scratch: bool = False,
 ) -> None:
     from trdlab.training.run import begin
-    from trdlab.training.setup import origin_line, plan, read_settings
+    from trdlab.training.setup import course_line, origin_line, plan, read_settings
 
-    settings = read_settings(kind, env, preset_name, config, given)
-    origin = origin_line(kind, env, preset_name, config)
+    settings = read_settings(kind, env, preset_name, config, given, from_scratch=from_scratch)
+    origin = f"{origin_line(kind, env, preset_name, config)} {course_line(settings)}".strip()
     if dry_run:
         from trdlab.agents.teachers import find_teacher
         from trdlab.show.training import plan_page
@@ -236,6 +245,7 @@ def _carry_on(
         origin: where its settings are from, to be said.
         longer: whether it was told to take more steps, to be said too.
     """
+    from trdlab.cli.fit import fit_run
     from trdlab.cli.progress import TrainingProgress, stopping
     from trdlab.deep.memory import available_memory
     from trdlab.environments.faults import EnvironmentFault
@@ -251,6 +261,7 @@ def _carry_on(
         teacher_line,
         updates_lines,
     )
+    from trdlab.training.loading import own_fit
     from trdlab.training.run import carry_on
 
     errors = common.errors()
@@ -288,13 +299,14 @@ def _carry_on(
     best, episodes = best_step(run.folder), settings.checkpoint_episodes
     if line := best_line(path, clock, best, episodes=episodes):
         _say(errors, line)
-    if not settings.evaluate_episodes:
-        return
-    result = _evaluate(path)
-    if run.trainer.lessons:
-        _say(errors, reached_line(float(result.returns.mean()), run.trainer.lessons.levels))
-    else:
-        _compare_with_chance(run.folder, result, settings)
+    if settings.evaluate_episodes:
+        result = _evaluate(path)
+        if run.trainer.lessons:
+            _say(errors, reached_line(float(result.returns.mean()), run.trainer.lessons.levels))
+        else:
+            _compare_with_chance(run.folder, result, settings)
+    if settings.fit and own_fit(path, None) is None:
+        fit_run(path)
 
 
 def _named(run: Path, checkpoint: int | None) -> tuple[Path, int | None]:

@@ -80,6 +80,15 @@ class NetworkEstimator:
             return None
         return outlook_of(self.channels, self._told(observations), self.time_axis, self.reach)
 
+    def features(self, observations: Any) -> FloatArray:
+        """Returns what the last layer reads of observations `[B, ...]`: `[B, F]`, float32.
+
+        Raises:
+            InputError: as for `decompose`.
+        """
+        network = self.network
+        return self._asked(lambda seen: network.body(network.preprocess(seen)), observations)
+
     def _told(self, observations: Any) -> FloatArray:
         """Returns all that the network tells: `[B, A, N+1]`, or of channels `[B, A, C, N+1]`."""
         components = self._asked(self.network, observations)  # [B, A, N+1], or [B, A·C, N+1]

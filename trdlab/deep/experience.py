@@ -24,6 +24,9 @@ from trdlab.rollouts.playing import Playing, any_actions
 from trdlab.rollouts.realised import next_flag
 from trdlab.time_axis import TimeAxis
 
+Look = Callable[[Any], NDArray[Any]]
+"""Returns what is kept of observations `[B, ...]`: `[B, F]`."""
+
 FAR = int(np.iinfo(np.int64).max)
 _NEVER = 2**40  # steps: no episode is so long
 
@@ -195,6 +198,7 @@ def gather(
     max_steps: int | None = None,
     seed: int = 0,
     outcomes: Outcomes | None = None,
+    look: Look | None = None,
     tell: Callable[[int], None] = lambda taken: None,
 ) -> Experience:
     """Plays episodes of a policy, with some of its actions forced, so that others are seen, too.
@@ -211,6 +215,7 @@ def gather(
         max_steps: after which an episode is cut off.
         seed: of everything.
         outcomes: what else is read of each step.
+        look: what is kept of observations `[B, ...]`, `[B, F]`; by default they themselves.
         tell: told how many steps have been taken, now and then.
 
     Raises:
@@ -238,7 +243,7 @@ def gather(
         with closing(_some(make, num_envs or _beside(steps), own)) as environments:
             playing = Playing(None, environments, rng, policy=policy, max_steps=max_steps)
             some = _played(
-                playing, future, share, pause, rng, read, steps=steps - taken, tell=watch
+                playing, future, share, pause, rng, read, look, steps=steps - taken, tell=watch
             )
         parts.append(some)
         taken += len(parts[-1].steps)
@@ -287,6 +292,7 @@ def _played(
     pause: int,
     rng: np.random.Generator,
     outcomes: Outcomes,
+    look: Look | None,
     *,
     steps: int,
     tell: Callable[[int, int], None],
@@ -299,7 +305,9 @@ def _played(
         running, ages, turn = playing.running, playing.ages, playing.turn()
         which = np.flatnonzero(running)
         rows = slice(None) if len(which) == count else which  # views take less time than copies
-        seen = playing.stack.newest[which]  # a copy: what is seen changes with the step
+        stack = playing.stack
+        # a copy: what is seen changes with the step
+        seen = look(stack.observations[which]) if look else stack.newest[which]
         forced = running & (rng.random(count) < share) & (ages >= free)
         free = np.where(forced, ages + 1 + pause, free)
         others = any_actions(rng, count, num_actions, playing.allowed)
@@ -315,7 +323,7 @@ def _played(
             none, nothing = np.zeros(len(over), dtype=np.bool_), np.zeros(len(over))
             ended = (none.astype(np.int64), none, nothing, np.zeros((len(over), read.shape[1])))
             whole, likely = playing.last_seen()
-            newest = whole[:, -1] if playing.stack.size else whole
+            newest = look(whole) if look else whole[:, -1] if playing.stack.size else whole
             log.add(over, newest, likely, *ended, none)
             wait = rng.geometric(share, len(over)) - 1 if share else np.full(len(over), _NEVER)
             coins = np.maximum(ages[over] + 1, free[over]) + wait
@@ -331,4 +339,5 @@ def _played(
     limits = [limit for limit in (own, playing.max_steps) if limit is not None]
     until = np.minimum(until, first + min(limits, default=_NEVER))
     told: dict[str, Any] = dict(zip(_COLUMNS, (*columns, until, last), strict=True))
-    return Experience(**told, stack=playing.stack.size, padding=playing.stack.padding)
+    size = None if look else playing.stack.size
+    return Experience(**told, stack=size, padding=playing.stack.padding)

@@ -45,6 +45,7 @@ class Fit:
         settings: how.
         names: of the outcomes in the experience.
         parts: the names of those that add up to the reward.
+        alike: whether all numbers that are seen are of one unit, as features are.
 
     Attributes:
         channels: what is forecast, C of them.
@@ -67,6 +68,7 @@ class Fit:
         *,
         names: Sequence[str] = (),
         parts: Sequence[str] = (),
+        alike: bool = False,
     ) -> None:
         self.experience, self.axis = experience, axis
         self.settings = settings or FitSettings()
@@ -93,7 +95,7 @@ class Fit:
         most = np.append(np.ones(axis.horizon), 1.0 / (1.0 - axis.gamma**axis.width))
         self.possible = ends[..., None] * (axis.discounts * most)  # [2, C, N+1]
         if isinstance(self.network, VectorNetwork) and self.network.num_states is None:
-            self.network.standardise(experience.frames[self._learned])
+            self.network.standardise(experience.frames[self._learned], alike=alike)
         self.target_network = deepcopy(self.network)
         self._mean = AveragedModel(self.network)  # of the networks since learning became slower
         self.optimizer = torch.optim.Adam(

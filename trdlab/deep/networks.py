@@ -22,6 +22,7 @@ from trdlab.deep.layers import (
 )
 from trdlab.errors import InputError
 
+_STILL = 0.05  # of how much all inputs move
 _UNBOUNDED = 1e6  # wider bounds are those of a number format, not of a quantity
 
 
@@ -193,10 +194,17 @@ class VectorNetwork(DecompositionNetwork):
         self.register_buffer("middle", torch.as_tensor(middle, dtype=torch.float32))
         self.register_buffer("scale", torch.as_tensor(scale, dtype=torch.float32))
 
-    def standardise(self, seen: NDArray[Any]) -> None:
-        """Makes inputs like these `[M, ...]` have mean 0 and deviation 1."""
+    def standardise(self, seen: NDArray[Any], *, alike: bool = False) -> None:
+        """Makes inputs like these `[M, ...]` have mean 0 and deviation 1.
+
+        Args:
+            seen: the inputs.
+            alike: whether all are of one unit: then one that hardly ever moves is not blown up.
+        """
         inputs = seen.reshape(len(seen), -1).astype(np.float64)  # [M, F]
         spread = inputs.std(axis=0)
+        if alike:
+            spread = np.maximum(spread, _STILL * spread.mean())
         self.middle.copy_(torch.as_tensor(inputs.mean(axis=0)))
         self.scale.copy_(torch.as_tensor(1.0 / np.where(spread > 1e-8, spread, 1.0)))
 

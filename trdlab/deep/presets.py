@@ -42,6 +42,7 @@ PRESETS: dict[Kind, dict[str, tuple[str, Config]]] = {
                 "clip_rewards": True,
                 "life_loss_ends": True,
                 "evaluate_epsilon": 0.01,
+                "fit": True,
                 "checkpoint_every": 50_000,
                 "log_every": 10_000,
             },
@@ -49,9 +50,33 @@ PRESETS: dict[Kind, dict[str, tuple[str, Config]]] = {
     },
 }
 """By kind and name: what it is for, and the lines."""
+_PAPER = PRESETS["atari"]["paper"][1]
+PRESETS["atari"]["cpu"] = (
+    "what a CPU can do: from an agent that comes with trdlab, or else a million steps",
+    _PAPER
+    | {
+        "agent_steps": 1_000_000,
+        "num_envs": 8,
+        "epsilon_steps": 250_000,
+        "learning_starts": 20_000,
+        "capacity": 200_000,
+        "precision": "auto",
+    },
+)
+PRESETS["atari"]["gpu"] = (
+    "the paper's ten million steps with 64 games side by side, for a GPU",
+    _PAPER
+    | {
+        "num_envs": 64,
+        "update_every": 64,
+        "batch_size": 512,  # as many windows a step as DQN
+        "target_sync_updates": 62,  # as many steps as in the paper, nearly
+        "precision": "auto",
+    },
+)
 PRESETS["atari"]["smoke"] = (
     "about a minute, to see that everything works",
-    PRESETS["atari"]["paper"][1]
+    _PAPER
     | {
         "agent_steps": 4_000,
         "num_envs": 4,
@@ -61,6 +86,7 @@ PRESETS["atari"]["smoke"] = (
         "precision": "auto",
         "evaluate_episodes": 5,
         "evaluate_epsilon": 0.05,
+        "fit_steps": 2_000,
         "checkpoint_every": 1_000,
         "log_every": 500,
     },
@@ -130,7 +156,9 @@ PRESETS["gym"] |= {
         },
     ),
 }
-DEFAULT_PRESETS: dict[Kind, str] = {"gym": "classic", "atari": "paper"}
+_TAUGHT: dict[str, Config] = {"cpu": {"agent_steps": 20_000, "offline_updates": 30_000}}
+"""By preset: what else is other where there is a teacher."""
+DEFAULT_PRESETS: dict[Kind, str] = {"gym": "classic", "atari": "cpu"}
 _TRIED = {
     "CartPole": "classic",
     "Acrobot": "acrobot",
@@ -157,12 +185,13 @@ def preset(kind: Kind, env: str, name: str | None = None) -> TrainSettings:
     return TrainSettings(kind, env).changed(known[wanted][1], f"The preset '{wanted}'")
 
 
-def with_teacher(kind: Kind, base: TrainSettings) -> Config:
+def with_teacher(kind: Kind, base: TrainSettings, name: str | None = None) -> Config:
     """Returns what else suits a run that learns from a teacher, and need not begin at random.
 
     Args:
         kind: of the run.
         base: the settings that it would have without one.
+        name: of the preset that they are from.
 
     >>> lines = with_teacher("atari", preset("atari", "Breakout"))
     >>> lines["epsilon_start"], lines["teacher_steps"], lines["offline_updates"]
@@ -177,7 +206,8 @@ def with_teacher(kind: Kind, base: TrainSettings) -> Config:
         lines |= {name: min(value, getattr(base, name)) for name, value in few.items()}
     steps, updates = (100_000, 30_000) if kind == "atari" else (20_000, 5_000)
     steps, updates = min(steps, base.agent_steps), min(updates, base.agent_steps // 4)
-    return lines | {"teacher_steps": steps, "offline_updates": updates}
+    lines |= {"teacher_steps": steps, "offline_updates": updates}
+    return lines | _TAUGHT.get(name or DEFAULT_PRESETS[kind], {})
 
 
 def default_preset(kind: Kind, env: str) -> str:

@@ -181,6 +181,13 @@ class TrainSettings:
         least=0,
         most=100_000,
     )
+    fit: bool = option(
+        False,
+        "When training is over, fit what the agent can expect, as it acts in an evaluation; "
+        "without it, the components are those learned with the policy.",
+        "Evaluation",
+    )
+    fit_steps: int = option(100_000, "Steps that it plays for that.", "Evaluation", least=1)
     checkpoint_every: int = option(
         20_000, "Agent steps between two checkpoints.", "Running", least=1
     )

@@ -11,6 +11,8 @@ from trdlab.environments.protocol import Step
 from trdlab.errors import InputError, closest
 
 INFO = "info."
+LIFE_LOST = "life_lost"
+"""The place of whether a life was lost, the last one, too, with which a game ends."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +47,7 @@ class Outcomes:
 
     Args:
         given: a function for each name, or where in `info` the number stands, as `info.KEY` or
-            `info.KEY.KEY`. What `info` does not name in a step is 0 there.
+            `info.KEY.KEY`; what `info` does not name in a step is 0 there. Or `life_lost`.
 
     Attributes:
         names: Q names.
@@ -64,15 +66,16 @@ class Outcomes:
         self._seen: set[str] = set()  # keys of `info` that were there, as `info.KEY`
         for name, what in self._given.items():
             is_place = isinstance(what, str) and what.startswith(INFO) and what != INFO
+            is_place |= what == LIFE_LOST
             if not name or not (is_place or callable(what)):
                 raise InputError(
                     f"The outcome '{name}' is {what!r}.",
-                    "Give a function of a step, or a place such as info.KEY.",
+                    f"Give a function of a step, a place such as info.KEY, or {LIFE_LOST}.",
                 )
 
     @property
     def places(self) -> dict[str, str]:
-        """Where each stands in `info`, or that it is a function."""
+        """Where each stands, or that it is a function."""
         return {
             name: what if isinstance(what, str) else "a function"
             for name, what in self._given.items()
@@ -113,13 +116,17 @@ class Outcomes:
             InputError: one was not; the message says what was there.
         """
         for name, what in self._given.items():
-            if isinstance(what, str) and what not in self._seen:
+            if isinstance(what, str) and what not in {LIFE_LOST, *self._seen}:
                 known = sorted(self._seen)
                 cure = closest(what, known) if known else "Its environment told nothing else."
                 raise InputError(f"The outcome '{name}' is {what}, and no step had that.", cure)
 
     def _number(self, name: str, what: Outcome | str, transition: Transition) -> float:
-        value = self._at(what, transition.info) if isinstance(what, str) else what(transition)
+        value: Any
+        if what == LIFE_LOST:
+            value = transition.life_lost or transition.terminated
+        else:
+            value = self._at(what, transition.info) if isinstance(what, str) else what(transition)
         try:
             number = float(value)
         except (TypeError, ValueError):

@@ -32,6 +32,7 @@ from trdlab.runs.keeping import (
     new_folder,
     sweep,
 )
+from trdlab.runs.pretrained import PRETRAINED, pretrained_path
 from trdlab.runs.state import Arrays, pack, unpack
 
 Read = TypeVar("Read")
@@ -149,12 +150,14 @@ def find_checkpoint(name: str) -> tuple[Path, int | None]:
     """Returns the folder of a run, and the step of the checkpoint that is named after an `@`.
 
     Args:
-        name: a run's folder, which names none; `RUN@STEP`; or `RUN@best`, for the one of the best
-            score.
+        name: a run's folder, or `pretrained:GAME`, which name none; `RUN@STEP`; or `RUN@best`, for
+            the one of the best score.
 
     Raises:
         InputError: there is no such run, or no such checkpoint of it.
     """
+    if name.startswith(PRETRAINED):  # of which there is one checkpoint
+        return pretrained_path(name), None
     folder, at, step = name.rpartition("@")
     if not at or not folder or Path(name).exists():
         return Path(name), None

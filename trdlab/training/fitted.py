@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trdlab.environments.interface import Interface
-from trdlab.environments.outcomes import INFO
+from trdlab.environments.outcomes import INFO, LIFE_LOST
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.estimator import Future
 from trdlab.runs import MetricsFile, RunFolder, checkpoint_steps, load_checkpoint, save_checkpoint
-from trdlab.runs.folder import check_free, is_fit
+from trdlab.runs.folder import check_free, is_fit, is_run
 from trdlab.time_axis import TimeAxis
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from trdlab.deep.fit import Fit
     from trdlab.deep.fit_settings import FitProgress, FitSettings
 
+_FITS = "fits"
 SAVE_SECONDS = 30.0
 """So often a fit is saved while it learns."""
 
@@ -42,6 +43,8 @@ class Plan:
         axis: γ, N and w.
         steps: that it plays, at least.
         share: of its actions that are forced.
+        epsilon: the chance that it takes any action, as a part of how it acts.
+        features: whether the features of its own network are read, in place of observations.
         outcomes: what else is forecast, and where it stands in `info`, or that it is a function.
         parts: those of the outcomes that add up to the reward.
         settings: how it is learned.
@@ -54,6 +57,8 @@ class Plan:
     axis: TimeAxis
     steps: int
     share: float
+    epsilon: float
+    features: bool
     outcomes: Mapping[str, str]
     parts: tuple[str, ...]
     settings: "FitSettings"
@@ -61,7 +66,8 @@ class Plan:
     @property
     def has_functions(self) -> bool:
         """Whether an outcome was given as a function, which has no name."""
-        return any(not place.startswith(INFO) for place in self.outcomes.values())
+        places = self.outcomes.values()
+        return any(place != LIFE_LOST and not place.startswith(INFO) for place in places)
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -73,6 +79,8 @@ class Plan:
             "width": axis.width,
             "steps": self.steps,
             "share": self.share,
+            "epsilon": self.epsilon,
+            "features": self.features,
             "outcomes": {name: of for name, of in places.items() if name not in self.parts},
             "parts": {name: places[name] for name in self.parts},
             **asdict(self.settings),
@@ -90,6 +98,8 @@ class Plan:
             "w": self.axis.width,
             "steps": self.steps,
             "share": self.share,
+            "epsilon": self.epsilon,
+            "features": self.features,
             "parts": list(self.parts),
             **asdict(self.settings),
         }
@@ -118,6 +128,8 @@ class Plan:
             axis=TimeAxis(config["gamma"], config["N"], config["w"]),
             steps=config["steps"],
             share=config["share"],
+            epsilon=config["epsilon"],
+            features=config["features"],
             outcomes=config.get("outcomes", {}),
             parts=tuple(config["parts"]),
             settings=FitSettings(**settings),
@@ -163,6 +175,19 @@ def new_fit(path: Path, plan: Plan, interface: Interface, future: Future) -> Run
     """
     extra = {"fit": {"interface": interface.to_dict(), "future": future.to_dict()}}
     return RunFolder.create(path, plan.to_config(), extra)
+
+
+def fit_path(run: Path, step: int) -> Path:
+    """Returns the folder, in that of a run, for the fit of one of its checkpoints."""
+    return run / _FITS / f"{step:09d}"
+
+
+def run_of(fit: Path) -> tuple[Path, int] | None:
+    """Returns the run in whose folder a fit lies, and which checkpoint was fitted; or None."""
+    folder = fit.absolute().parent
+    if folder.name == _FITS and fit.name.isdecimal() and is_run(folder.parent):
+        return folder.parent, int(fit.name)
+    return None
 
 
 def is_done(folder: RunFolder) -> bool:
@@ -288,11 +313,14 @@ def _save(
 def load_fit(path: Path) -> "tuple[NetworkEstimator, Interface, Plan]":
     """Returns what was fitted, the best of it so far, what its agent sees and does, and the plan.
 
+    Where it reads features, so does the estimator (see `upon`).
+
     Raises:
         TrdlabError: something is torn.
     """
     from trdlab.deep.channels import Channel
     from trdlab.deep.estimator import NetworkEstimator
+    from trdlab.deep.features import features_space
     from trdlab.deep.networks import build_network
     from trdlab.deep.update import load_weights
 
@@ -305,7 +333,10 @@ def load_fit(path: Path) -> "tuple[NetworkEstimator, Interface, Plan]":
         channels = tuple(Channel(**channel) for channel in state["channels"])
         hidden = tuple(size for size in state["hidden"] if size)
         rows = len(interface.action_names) * len(channels)
-        network = build_network(interface.space, rows, plan.axis, seed=0, hidden=hidden)
+        space = interface.space
+        if plan.features:
+            space = features_space(state["q_network"]["body.0.weight"].shape[1])
+        network = build_network(space, rows, plan.axis, seed=0, hidden=hidden)
         load_weights(network, state["q_network"])
     except (LookupError, TypeError, ValueError, InputError) as error:
         raise TrdlabError(

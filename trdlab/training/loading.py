@@ -13,9 +13,10 @@ from trdlab.estimator import Estimator
 from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, score
 from trdlab.rollouts.playing import Watch, unwatched, usual_limit
-from trdlab.runs import RunFolder, best_step, read_arrays
+from trdlab.runs import RunFolder, best_step, checkpoint_steps, find_checkpoint, read_arrays
 from trdlab.runs.folder import is_fit
-from trdlab.training.fitted import load_fit
+from trdlab.runs.pretrained import is_shipped
+from trdlab.training.fitted import fit_path, is_done, load_fit, run_of
 from trdlab.training.machine import use_threads
 from trdlab.training.setup import future, make_environments
 
@@ -29,24 +30,63 @@ CHECKPOINT_SEED = 2000
 """Nor that of an evaluation, so that no agent is chosen for what it then is evaluated by."""
 
 
-def load(path: str | Path, step: int | None = None) -> "NetworkEstimator":
+def load(path: str | Path, step: int | None = None, *, joint: bool = False) -> "NetworkEstimator":
     """Loads the agent of a run as an Estimator; its environment is not needed.
+
+    Where the agent was fitted when its training was over, it is the fit that tells its future.
 
     `trdlab.load("runs/…").decompose(observations)` is the shortest way from a trained network to
     the components of every action.
 
     Args:
-        path: the run's folder, or that of a fit.
+        path: the run's folder, `RUN@STEP`, or `pretrained:GAME`; or that of a fit.
         step: of a checkpoint, in agent steps; by default that of the run's agent: the newest one,
             or the best where checkpoints are evaluated.
+        joint: the components as they were learned with the policy, though there is a fit.
 
     Raises:
-        InputError: there is no run, or no such checkpoint.
+        InputError: there is no run, or no such checkpoint; or the fit of an agent that is kept
+            elsewhere reads its features.
         TrdlabError: something is torn.
     """
-    if step is None and is_fit(Path(path)):
-        return load_fit(Path(path))[0]
-    return _loaded(RunFolder.open(Path(path)), step)[1]
+    path, named = find_checkpoint(str(path))
+    step = named if step is None else step
+    if step is None and is_fit(path):
+        fitted, _, plan = load_fit(path)
+        if not plan.features:
+            return fitted
+        if (of := run_of(path)) is None:
+            raise InputError(
+                f"'{path}' reads the features of '{plan.agent}'.",
+                f"Load both: trdlab.agent('{path}').estimator",
+            )
+        return _upon(_loaded(RunFolder.open(of[0]), of[1])[1], path)
+    step, network = _loaded(RunFolder.open(path), step)
+    own = None if joint else own_fit(path, step)
+    return network if own is None else _upon(network, own)
+
+
+def own_fit(path: Path, step: int | None) -> Path | None:
+    """Returns the fit in a run's folder of one of its checkpoints; None where there is none.
+
+    Args:
+        path: the run's folder.
+        step: of the checkpoint, in agent steps; by default that of the run's agent.
+
+    Raises:
+        InputError: the run's settings are none, or out of their range.
+        TrdlabError: the fit is torn.
+    """
+    found = fit_path(path, chosen_step(RunFolder.open(path)) if step is None else step)
+    return found if is_fit(found) and is_done(RunFolder.open(found)) else None
+
+
+def _upon(network: "NetworkEstimator", fit: Path) -> "NetworkEstimator":
+    """Returns the fit of the agent of a run."""
+    from trdlab.deep.features import upon
+
+    fitted, _, plan = load_fit(fit)
+    return upon(network, fitted) if plan.features else fitted
 
 
 def _loaded(folder: RunFolder, step: int | None) -> tuple[int, "NetworkEstimator"]:
@@ -85,6 +125,16 @@ def agent_step(folder: RunFolder) -> int | None:
         InputError: its settings are none, or out of their range.
     """
     return best_step(folder) if run_settings(folder).checkpoint_episodes else None
+
+
+def chosen_step(folder: RunFolder) -> int:
+    """Returns the step of the checkpoint that is the run's agent; 0 while there is none.
+
+    Raises:
+        InputError: its settings are none, or out of their range.
+    """
+    step = agent_step(folder)
+    return max(checkpoint_steps(folder), default=0) if step is None else step
 
 
 def run_settings(folder: RunFolder) -> TrainSettings:
@@ -214,6 +264,8 @@ def _evaluated(
 
 def _keep(path: Path, data: dict[str, Any]) -> Path | OutputError:
     """Writes an evaluation into the folder of its run, or returns why that cannot be done."""
+    if is_shipped(path.parents[1]):
+        return OutputError("What comes with trdlab is left as it is.")
     with suppress(OSError):  # some ways to copy a run leave out empty folders
         path.parent.mkdir(exist_ok=True)
     try:

@@ -26,6 +26,7 @@ from trdlab.runs import (
     save_checkpoint,
 )
 from trdlab.runs.folder import check_free, is_run
+from trdlab.runs.pretrained import PRETRAINED, is_shipped
 from trdlab.training.loading import (
     estimator_of,
     evaluate_checkpoint,
@@ -158,6 +159,12 @@ def resume(
         NotImported: its environment needs a module that has not been imported.
         TrdlabError: another process holds it, or something is torn.
     """
+    if is_shipped(path):
+        name = f"{PRETRAINED}{path.name}"
+        raise InputError(
+            f"'{name}' comes with trdlab, and is left as it is.",
+            f"Let another one learn from it: --teacher {name}",
+        )
     folder = RunFolder.open(path)
     before = run_settings(folder)
     settings = _longer(before, agent_steps)

@@ -19,6 +19,7 @@ from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.files import check_small_text, free_name
 from trdlab.runs import read_config
+from trdlab.runs.pretrained import PRETRAINED, pretrained_names
 from trdlab.training.machine import check_threads, memory_of, resolved, use_threads
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from trdlab.training.teaching import FindTeacher
 
 _MEASURED_SECONDS = 3.0
+_SMALL = 10_000  # agent steps: below, a run is over soon
 
 
 def read_settings(
@@ -36,14 +38,27 @@ def read_settings(
     preset_name: str | None,
     config: Path | None,
     given: Mapping[str, Any],
+    *,
+    from_scratch: bool = False,
 ) -> TrainSettings:
     """Returns settings from a preset, then a file, then single options; later ones win.
 
     A file that says what it is for is complete, such as a run's own: no preset stands behind it.
+    Without either, Atari games are learned as suits the machine, and on a CPU from the agent that
+    comes with trdlab, if there is one of that game.
+
+    Args:
+        kind: of the run.
+        env: where it acts.
+        preset_name: of the preset; None for the environment's own, or what suits the machine.
+        config: the file.
+        given: the options.
+        from_scratch: whether to learn from nobody, unless a teacher is given.
 
     Raises:
         InputError: there is no such preset or file, or a key or value cannot be used.
     """
+    preset_name = preset_name or usual_preset(kind)
     base, in_file, lines = preset(kind, env, preset_name), dict[str, Any](), dict[str, Any]()
     if config is not None:
         lines = _lines_of(config)
@@ -55,8 +70,35 @@ def read_settings(
         in_file = checked(lines, f"'{config}'")
     # together, since one may only be in its range beside another
     told = {**in_file, **checked(given, "The command")}
+    own = shipped_teacher(kind, env) if preset_name == "cpu" and not from_scratch else None
+    if own is not None and not _is_complete(lines):
+        told = {"teacher": own, **told}
     is_taught = "teacher" in told and base.teacher is None and not _is_complete(lines)
-    return replace(base, **{**(with_teacher(kind, base) if is_taught else {}), **told})
+    taught = with_teacher(kind, base, preset_name) if is_taught else {}
+    return replace(base, **{**taught, **told})
+
+
+def usual_preset(kind: Kind) -> str | None:
+    """Returns the preset of Atari games that suits the machine; None for other environments."""
+    if kind != "atari":
+        return None
+    import torch
+
+    return "gpu" if torch.cuda.is_available() else "cpu"
+
+
+def shipped_teacher(kind: Kind, env: str) -> str | None:
+    """Returns the agent that comes with trdlab for an Atari game; None where there is none.
+
+    Raises:
+        InputError: there is no such game.
+    """
+    if kind != "atari":
+        return None
+    from trdlab.atari.names import find_game
+
+    game = find_game(env)
+    return f"{PRETRAINED}{game}" if game in pretrained_names() else None
 
 
 def origin_line(kind: Kind, env: str, preset_name: str | None, config: Path | None) -> str:
@@ -67,7 +109,23 @@ def origin_line(kind: Kind, env: str, preset_name: str | None, config: Path | No
     """
     if config is not None and _is_complete(_lines_of(config)):
         return f"Settings: those of '{config}'."
-    return preset_line(kind, env, preset_name)
+    return preset_line(kind, env, preset_name or usual_preset(kind))
+
+
+def course_line(settings: TrainSettings) -> str:
+    """Returns what may be expected of a run that learns a game on a CPU; empty of all others.
+
+    >>> course_line(TrainSettings("gym", "CartPole-v1"))
+    ''
+    """
+    if settings.kind != "atari" or settings.agent_steps < _SMALL or usual_preset("atari") != "cpu":
+        return ""
+    if settings.teacher is None:
+        return (
+            "From scratch a CPU takes hours for a million steps, and in these few games get far: "
+            "--teacher takes less."
+        )
+    return "With a teacher it takes about half an hour on two cores."
 
 
 def _lines_of(config: Path) -> dict[str, Any]:

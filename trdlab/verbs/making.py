@@ -1,7 +1,7 @@
 """Making agents: solve a model, train a network, name an agent or fit one."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +10,7 @@ from trdlab.errors import InputError, closest
 
 OWN = "the agent's own policy"
 """Whose future a fitted decomposition tells."""
+_LEAST_UPDATES, _MOST_UPDATES = 1_000, 20_000  # of the fit of a run, by how much it has played
 
 if TYPE_CHECKING:
     from trdlab.agents.agent import Agent
@@ -180,6 +181,49 @@ def train(
     with begin(chosen, None if out is None else Path(out), find=find_teacher) as run:
         carry_on(run, on_metrics=on_metrics)
         path = run.folder.path
+    return fit_run(path) if chosen.fit else find_agent(str(path))
+
+
+def fit_run(path: Path, **watched: Any) -> "Agent":
+    """Fits the agent of a run as it acts in an evaluation, and keeps that in the run's folder.
+
+    Of a game with lives it is forecast, too, that one is lost.
+
+    Args:
+        path: the run's folder.
+        watched: `progress` and `should_stop`, as for `fit`.
+
+    Raises:
+        InputError: there is no run, or no checkpoint.
+        OutputError: its folder cannot be written.
+        Stopped: it should stop.
+    """
+    from trdlab.agents.naming import find_agent
+    from trdlab.environments.outcomes import LIFE_LOST
+    from trdlab.runs import RunFolder
+    from trdlab.training.fitted import fit_path
+    from trdlab.training.loading import chosen_step, run_settings
+
+    folder = RunFolder.open(path)
+    settings, step = run_settings(folder), chosen_step(folder)
+    agent = find_agent(f"{path}@{step}", joint=True)
+    with closing(agent.make(1, settings.seed)) as environments:
+        environments.reset()
+        has_lives = getattr(environments, "has_lives", False)
+    origin = agent.origin and replace(agent.origin, name=f"{path.absolute().name}@{step}")
+    fit(
+        replace(agent, origin=origin),
+        horizon=settings.horizon,
+        width=settings.width,
+        steps=settings.fit_steps,
+        epsilon=settings.evaluate_epsilon,
+        features=True,
+        seed=settings.seed,
+        outcomes={"life lost": LIFE_LOST} if has_lives else {},
+        most_updates=max(_LEAST_UPDATES, min(_MOST_UPDATES, settings.fit_steps // 5)),
+        out=fit_path(path, step),
+        **watched,
+    )
     return find_agent(str(path))
 
 
@@ -192,6 +236,8 @@ def fit(
     gamma: float | None = None,
     steps: int = 100_000,
     share: float = 0.1,
+    epsilon: float = 0.0,
+    features: bool = False,
     seed: int = 1,
     outcomes: "Mapping[str, Outcome | str] | None" = None,
     parts: "Mapping[str, Outcome | str] | None" = None,
@@ -215,9 +261,14 @@ def fit(
         gamma: γ; by default the agent's own, or 0.99.
         steps: how many it plays, at least.
         share: the chance that an action is forced.
+        epsilon: the chance of any action at random, as a part of the policy itself. Games that go
+            the same way each time then do not.
+        features: whether to learn from what the last layer of the agent's own network reads, which
+            must be one of trdlab's. That takes a hundredth of the time where it sees images.
         seed: of everything.
-        outcomes: what else to forecast, by name: a function of a step (see `Transition`), or where
-            a number stands in `info`, such as `"info.fuel"`. What is always 0 or 1 is an event.
+        outcomes: what else to forecast, by name: a function of a step (see `Transition`), where
+            a number stands in `info`, such as `"info.fuel"`, or `"life_lost"`. What is always 0 or
+            1 is an event.
         parts: likewise, what adds up to the reward.
         seconds: after which learning stops, if not before; then the seed is not all it depends on.
         out: a folder to keep it in, which names the agent from then on. Where the same fit was
@@ -233,12 +284,13 @@ def fit(
         Stopped: it should stop.
     """
     from trdlab.deep.experience import Experience, gather
+    from trdlab.deep.features import features_space, trunk_of, upon
     from trdlab.deep.fit import Fit
     from trdlab.deep.fit_settings import FitSettings
     from trdlab.environments.outcomes import Outcomes
     from trdlab.estimator import Future
     from trdlab.explanations.calibration.calibration import calibrate
-    from trdlab.policies import acting
+    from trdlab.policies import EpsilonGreedy, acting
     from trdlab.rollouts.playing import usual_limit
     from trdlab.time_axis import TimeAxis
     from trdlab.training import fitted
@@ -249,7 +301,12 @@ def fit(
     own = getattr(policy, "gamma", None)
     if own is None:
         own = frozen.estimator.time_axis.gamma if frozen.is_fitted else 0.99
-    axis, future = TimeAxis(own if gamma is None else gamma, horizon, width), Future(OWN)
+    if epsilon:
+        policy = EpsilonGreedy(policy, epsilon)
+    trunk = trunk_of(policy) if features else None
+    at_random = f" (ε = {epsilon:g})" if epsilon else ""
+    axis = TimeAxis(own if gamma is None else gamma, horizon, width)
+    future = Future(f"{OWN}{at_random}")
     made_of, beside = dict(parts or {}), dict(outcomes or {})
     if twice := sorted(made_of.keys() & beside.keys()):
         raise InputError(
@@ -265,6 +322,8 @@ def fit(
         axis=axis,
         steps=steps,
         share=share,
+        epsilon=epsilon,
+        features=features,
         outcomes=read.places,
         parts=tuple(made_of),
         settings=chosen,
@@ -291,12 +350,16 @@ def fit(
             max_steps=usual_limit(axis),
             seed=seed,
             outcomes=read,
+            look=trunk.features if trunk else None,
             tell=taken,
         )
 
     def begun(experience: Experience) -> Fit:
         space = frozen.interface.space
-        return Fit(experience, space, axis, chosen, names=read.names, parts=tuple(made_of))
+        if features:
+            space = features_space(experience.frames.shape[1])
+        told: dict[str, Any] = {"names": read.names, "parts": tuple(made_of), "alike": features}
+        return Fit(experience, space, axis, chosen, **told)
 
     def kept() -> "RunFolder":
         return fitted.new_fit(Path(str(out)), plan, frozen.interface, future)
@@ -316,6 +379,8 @@ def fit(
             tell=watch.tell if progress else lambda now: None,
             should_stop=should_stop,
         )
+    if trunk is not None:
+        estimator = upon(trunk, estimator)
     called = frozen.name if out is None else Path(out).name
     return replace(frozen, name=called, estimator=estimator, policy=policy)
 

@@ -200,6 +200,11 @@ def test_the_learning_rate_falls_evenly_over_the_run():
     assert [falling.learning_rate_at(steps) for steps in (0, 250, 1000, 1007)] == pytest.approx(
         [4e-3, 3e-3, 0.0, 0.0]
     )
+    # 250 updates offline last as long as 1000 agent steps, at one update for every four
+    taught = falling.changed({"teacher": "a.zip", "offline_updates": 250, "update_every": 4})
+    told = [taught.learning_rate_at(steps, of) for steps, of in ((0, 0), (0, 125), (0, 250))]
+    assert told == pytest.approx([4e-3, 3e-3, 2e-3])
+    assert taught.learning_rate_at(500) == pytest.approx(1e-3)
 
 
 def test_updates_that_are_due():

@@ -156,7 +156,14 @@ PRESETS["gym"] |= {
         },
     ),
 }
-_TAUGHT: dict[str, Config] = {"cpu": {"agent_steps": 20_000, "offline_updates": 30_000}}
+_TAUGHT: dict[str, Config] = {
+    "cpu": {
+        "agent_steps": 10_000,
+        "offline_updates": 25_000,
+        "learning_rate": 7e-4,  # what a teacher does stays the same, and may be learned fast
+        "learning_rate_end": 1e-5,
+    }
+}
 """By preset: what else is other where there is a teacher."""
 DEFAULT_PRESETS: dict[Kind, str] = {"gym": "classic", "atari": "cpu"}
 _TRIED = {
@@ -195,7 +202,7 @@ def with_teacher(kind: Kind, base: TrainSettings, name: str | None = None) -> Co
 
     >>> lines = with_teacher("atari", preset("atari", "Breakout"))
     >>> lines["epsilon_start"], lines["teacher_steps"], lines["offline_updates"]
-    (0.01, 100000, 30000)
+    (0.01, 100000, 25000)
     """
     lines: Config = {
         "epsilon_start": base.epsilon_end,

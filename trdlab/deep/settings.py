@@ -277,11 +277,19 @@ class TrainSettings:
         part = min(1.0, agent_steps / max(1, self.epsilon_steps))
         return (1.0 - part) * self.epsilon_start + part * self.epsilon_end
 
-    def learning_rate_at(self, agent_steps: int) -> float:
-        """Returns Adam's learning rate after so many agent steps."""
+    def learning_rate_at(self, agent_steps: int, offline_updates: int | None = None) -> float:
+        """Returns Adam's learning rate; it falls over all updates, offline ones included.
+
+        Args:
+            agent_steps: taken so far.
+            offline_updates: made so far; by default all.
+        """
         if self.learning_rate_end is None:
             return self.learning_rate
-        part = min(1.0, agent_steps / self.agent_steps)
+        whole = 0 if self.teacher is None else self.offline_updates
+        offline = whole if offline_updates is None else offline_updates
+        done = self.update_every * offline + agent_steps  # in agent steps
+        part = min(1.0, done / (self.update_every * whole + self.agent_steps))
         return (1.0 - part) * self.learning_rate + part * self.learning_rate_end
 
     def updates_due(self, agent_steps: int) -> int:

@@ -118,6 +118,7 @@ class Trainer:
         """
         phase = self.phase
         if self.lessons and phase == "offline":
+            self.learner.set_learning_rate(self._learning_rate)
             self._update()
             self.lessons.offline_updates += 1
         else:
@@ -166,11 +167,16 @@ class Trainer:
             loss=self._losses / updates if updates else None,
             mean_value=self._values / updates if updates else None,
             epsilon=self.settings.epsilon(self.agent_steps),
-            learning_rate=self.settings.learning_rate_at(self.agent_steps),
+            learning_rate=self._learning_rate,
             teaching=self._teaching(),
         )
         self._losses, self._values, self._updates_told = 0.0, 0.0, told.updates
         return told
+
+    @property
+    def _learning_rate(self) -> float:
+        offline = self.lessons.offline_updates if self.lessons else None
+        return self.settings.learning_rate_at(self.agent_steps, offline)
 
     def _teaching(self) -> TeachingMetrics | None:
         if not (of := self.lessons):
@@ -241,7 +247,7 @@ class Trainer:
         before = self.lessons.offline_updates if self.lessons else 0
         due = before + self.settings.updates_due(self.agent_steps)
         if self.learner.num_updates < due:
-            self.learner.set_learning_rate(self.settings.learning_rate_at(self.agent_steps))
+            self.learner.set_learning_rate(self._learning_rate)
         while self.learner.num_updates < due:
             self._update()
 

@@ -322,9 +322,10 @@ def _named(run: Path, checkpoint: int | None) -> tuple[Path, int | None]:
 
 def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
     """Evaluates the agent of a run, prints the result, and says where it is kept."""
+    from trdlab.atari.names import find_game
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.runs import RunFolder
-    from trdlab.show.training import acts, evaluation_page
+    from trdlab.show.training import acts, evaluation_page, human_line
     from trdlab.training.loading import evaluate_run, run_settings
 
     errors = common.errors()
@@ -333,8 +334,11 @@ def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
     if as_json:
         common.print_json(result.to_dict())
     else:
-        acting = acts(run_settings(RunFolder.open(path)))
-        common.print_text(evaluation_page(result, how=acting))
+        settings = run_settings(RunFolder.open(path))
+        common.print_text(evaluation_page(result, how=acts(settings)))
+        mean = float(result.returns.mean())
+        if settings.kind == "atari" and (line := human_line(find_game(settings.env), mean)):
+            common.print_line(line)
     _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
     return result
 

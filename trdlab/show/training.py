@@ -7,6 +7,7 @@ from shlex import quote
 import numpy as np
 from rich.text import Text
 
+from trdlab.atari.published import HUMAN, human_normalised
 from trdlab.deep.lessons import Levels
 from trdlab.deep.metrics import Standing
 from trdlab.deep.settings import TrainSettings
@@ -169,6 +170,23 @@ def reached_line(mean: float, levels: Levels) -> str:
     return "Of the way from random actions ({}) to its teacher ({}) it has come {:.0%}.".format(
         *ends, come
     ).replace("%.", " %.")
+
+
+def human_line(game: str, mean: float) -> str:
+    """Returns what a score is beside that of a person; empty where none was published.
+
+    >>> human_line("Breakout", 110.5)
+    'Random actions reach 1.7, a person 31.8 (Mnih et al., 2015): it has come 3.6 times as far.'
+    >>> human_line("Tetris", 1.0)
+    ''
+    """
+    share = human_normalised(game, mean)
+    if share is None:
+        return ""
+    random, human = (f"{of:,g}" for of in HUMAN[game])
+    much = f"{share:.2g} times as far" if share >= 1.0 else f"{max(share, 0.0):.0%} of the way"
+    told = f"Random actions reach {random}, a person {human} (Mnih et al., 2015)"
+    return f"{told}: it has come {much}.".replace("%", " %")
 
 
 def updates_lines(settings: TrainSettings) -> list[str]:

@@ -110,7 +110,7 @@ def model_agent(
         policy=Memoryless(lambda states: policy[states]),
         world=world,
         is_away=not place.is_model(solved.mdp),
-        copying=Copying(episodes=100),
+        copying=Copying(judged=300, episodes=100),  # of an exact table they are cheap
     )
 
 

@@ -24,7 +24,8 @@ from trdlab.tabular import MDP
 if TYPE_CHECKING:
     from trdlab.deep.settings import TrainSettings
 
-_OF_GAMES = Copying(episodes=12, moments=2, copies=2, tries=10)  # a copy plays all of a game again
+# a game is long, and a copy plays all of it again
+_OF_GAMES = Copying(judged=16, episodes=12, moments=2, copies=2, tries=10)
 
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""

@@ -149,7 +149,7 @@ def explain(
         action: the name or number of the action to explain, by default what the policy does.
         foil: of the one to contrast it with, by default the best other one.
         episodes: by how many the forecasts are judged, 0 for not at all; by default 300 of an exact
-            table and 50 of another agent.
+            table, 16 of a game, and else 50.
         report: how far the forecasts can be trusted, if that is known: then no episodes are played.
         max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
             says, and no sooner than the step that is explained.

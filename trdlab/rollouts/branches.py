@@ -38,15 +38,17 @@ class Branches(Samples):
 
 @dataclass(frozen=True)
 class Copying:
-    """How much is copied of the states of an agent.
+    """How much is played and copied to judge an agent, where nothing else is said.
 
     Args:
+        judged: by how many episodes its forecasts are judged.
         episodes: how many are played for the ceiling.
         moments: how many states of each are copied, about.
         copies: how often each is.
         tries: how often each of two actions is tried at a state.
     """
 
+    judged: int = 50
     episodes: int = 20
     moments: int = 5
     copies: int = 8

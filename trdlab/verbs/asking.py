@@ -26,7 +26,8 @@ def calibrate(
 
     Args:
         agent: whatever `trdlab.agent` takes.
-        episodes: by how many it is judged; by default 300 of an exact table, 50 of another agent.
+        episodes: by how many it is judged; by default 300 of an exact table, 16 of a game, and else
+            50.
         epsilon: the chance of a random action in them; by default none, or a little where all
             episodes would be the same.
         max_steps: after which an episode is cut off; by default as `usual_limit` says.
@@ -78,7 +79,7 @@ def explain(
         parts: what is asked for, of forecast, contrast, episode and calibration, with commas
             between; by default what matters most.
         episodes: by how many other episodes it is judged, 0 for not at all; by default 300 of an
-            exact table, 50 of another agent.
+            exact table, 16 of a game, and else 50.
         report: of `trdlab.calibrate` on the same agent, in place of such episodes.
         max_steps: after which an episode is cut off; by default as `usual_limit` says.
         watch: told how far the episodes are, after every step.

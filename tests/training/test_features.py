@@ -47,18 +47,39 @@ def test_an_agent_of_a_run_is_told_by_its_fit(run):
     assert outlook.survival.shape == (5, 2, 5)
 
 
-def test_what_is_told_of_an_observation_is_what_the_fit_tells_of_its_features(run):
+@pytest.fixture(scope="module")
+def frozen(run, tmp_path_factory) -> Path:
+    """A fit of the same agent that reads its frozen features, kept elsewhere."""
+    out, agent = tmp_path_factory.mktemp("fits") / "frozen", find_agent(str(run), joint=True)
+    trdlab.fit(agent, horizon=4, steps=500, layers="frozen", most_updates=200, out=out)
+    return out
+
+
+def test_what_is_told_of_an_observation_is_what_the_fit_tells_of_its_features(run, frozen):
     trunk = trunk_of(find_agent(str(run), joint=True).estimator)
-    top, _, plan = load_fit(fit_path(run, 600))
-    assert plan.features
+    top, _, plan = load_fit(frozen)
+    assert plan.layers == "frozen"
     seen = np.random.default_rng(1).normal(size=(3, 4)).astype(np.float32)
     features = trunk.features(seen)
     with torch.no_grad():
         inputs = trunk.network.preprocess(torch.from_numpy(seen))
         assert np.array_equal(features, trunk.network.body(inputs).numpy())
-    whole = upon(trunk, top)
     alone = top.decompose(features).components
-    np.testing.assert_allclose(whole.decompose(seen).components, alone, atol=1e-6)
+    whole = trdlab.agent(str(frozen)).estimator.decompose(seen).components
+    np.testing.assert_allclose(whole, alone, atol=1e-6)
+
+
+def test_copied_layers_begin_as_the_agent_s_and_leave_these_alone(run):
+    agent = find_agent(str(run), joint=True)
+    own = agent.estimator.network
+    before = {name: of.clone() for name, of in own.state_dict().items()}
+    how: dict[str, Any] = {"horizon": 2, "steps": 200, "learning_rate": 1e-12, "check_every": 1}
+    few: dict[str, Any] = {"most_updates": 1, "sync_every": 1, "layers": "copied"}
+    fitted = trdlab.fit(agent, **how, **few).estimator.network
+    for name, of in fitted.body.state_dict().items():
+        torch.testing.assert_close(of, before[f"body.{name}"])
+    assert fitted.policy_head is None
+    assert all(torch.equal(of, before[name]) for name, of in own.state_dict().items())
 
 
 def test_a_fit_goes_wherever_its_run_goes(run, tmp_path, monkeypatch):
@@ -73,27 +94,22 @@ def test_a_fit_goes_wherever_its_run_goes(run, tmp_path, monkeypatch):
     assert np.array_equal(trdlab.load(fit_path(moved, 600)).decompose(seen).components, expected)
 
 
-def test_a_fit_of_features_kept_elsewhere_needs_its_agent(run, tmp_path):
-    out = tmp_path / "fit"
-    agent = find_agent(str(run), joint=True)
-    fitted = trdlab.fit(agent, horizon=3, steps=500, features=True, most_updates=200, out=out)
-    seen = np.zeros((2, 4), dtype=np.float32)
-    again = trdlab.agent(str(out)).estimator.decompose(seen).components
-    assert np.array_equal(fitted.estimator.decompose(seen).components, again)
-    with pytest.raises(InputError, match=r"reads the features of '.*drone@?.*'\. Load both: "):
-        trdlab.load(out)
+def test_a_fit_of_features_kept_elsewhere_needs_its_agent(run, frozen):
+    with pytest.raises(InputError, match=r"reads the features of '.*drone'\. Load both: "):
+        trdlab.load(frozen)
 
 
-def test_features_that_fit_another_network_are_refused(run, tmp_path):
+def test_features_that_fit_another_network_are_refused(frozen, tmp_path):
     other = train(tmp_path / "other", "CartPole-v1", **FEW | {"hidden": [8]})
-    top = load_fit(fit_path(run, 600))[0]
     with pytest.raises(InputError, match=r"reads 16 features, .* has 8\."):
-        upon(trunk_of(trdlab.load(other)), top)
+        upon(trunk_of(trdlab.load(other)), load_fit(frozen)[0])
 
 
 def test_only_networks_of_trdlab_have_features_to_read():
     with pytest.raises(InputError, match=r"The features of a [A-Z][A-Za-z]+ cannot be read"):
-        trdlab.fit(lambda seen: 0, "CartPole-v1", features=True, steps=200)
+        trdlab.fit(lambda seen: 0, "CartPole-v1", layers="frozen", steps=200)
+    with pytest.raises(InputError, match=r"no 'frosen' layers\. Did you mean 'frozen'\?"):
+        trdlab.fit(lambda seen: 0, "CartPole-v1", layers="frosen", steps=200)
 
 
 def test_a_run_told_to_fits_when_its_training_is_over(tmp_path):

@@ -179,7 +179,7 @@ def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent
 def _with_fit(of: Agent, estimator: "NetworkEstimator", whose: Plan) -> Agent:
     """Returns an agent whose future a fit tells, as `load_fit` has read it."""
     policy = acting(of.policy or of.estimator)
-    if whose.features:
+    if whose.layers == "frozen":
         from trdlab.deep.features import trunk_of, upon
 
         estimator = upon(trunk_of(policy), estimator)

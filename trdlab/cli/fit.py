@@ -48,13 +48,14 @@ def fit(
             "--epsilon", help="Chance of any action at random, as a part of it.", min=0, max=1
         ),
     ] = 0.0,
-    features: Annotated[
-        bool,
+    layers: Annotated[
+        str,
         typer.Option(
-            "--features",
-            help="Learn from what the last layer of its own network reads: of trdlab's runs.",
+            "--layers",
+            help="What the network begins with: new weights; those copied from the agent's own "
+            "network, of trdlab's runs; or those, frozen, which is quicker and less exact.",
         ),
-    ] = False,
+    ] = "new",
     method: Annotated[
         str, typer.Option("--method", help="mixed, regression or td (see the guide).")
     ] = "mixed",
@@ -105,7 +106,7 @@ def fit(
         steps=steps,
         share=share,
         epsilon=epsilon,
-        features=features,
+        layers=layers,
         seed=seed,
         seconds=limit_seconds,
         method=method,

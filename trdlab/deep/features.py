@@ -32,7 +32,7 @@ def trunk_of(who: Any) -> NetworkEstimator:
         return who
     raise InputError(
         f"The features of a {type(who).__name__} cannot be read: it is no network of trdlab's.",
-        "Fit it without `features`.",
+        "Fit it with new layers.",
     )
 
 

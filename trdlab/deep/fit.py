@@ -46,6 +46,7 @@ class Fit:
         names: of the outcomes in the experience.
         parts: the names of those that add up to the reward.
         alike: whether all numbers that are seen are of one unit, as features are.
+        copied: a network whose layers it begins with, all but the last; by default it has new ones.
 
     Attributes:
         channels: what is forecast, C of them.
@@ -69,6 +70,7 @@ class Fit:
         names: Sequence[str] = (),
         parts: Sequence[str] = (),
         alike: bool = False,
+        copied: DecompositionNetwork | None = None,
     ) -> None:
         self.experience, self.axis = experience, axis
         self.settings = settings or FitSettings()
@@ -83,7 +85,11 @@ class Fit:
         hidden = usual if self.settings.hidden is None else self.settings.hidden
         self._learning_rate = self.settings.learning_rate or (1e-2 if is_table else 1e-3)
         outputs = self.num_actions * len(self.channels)
-        self.network = build_network(space, outputs, axis, seed=self.settings.seed, hidden=hidden)
+        if copied is None:
+            new = build_network(space, outputs, axis, seed=self.settings.seed, hidden=hidden)
+        else:
+            new = copied.with_outputs(outputs, axis.num_components, seed=self.settings.seed)
+        self.network = new
         self._learned, self._kept = self._split()
         rows = self.rng.choice(self._learned, min(len(self._learned), 20_000), replace=False)
         middle, self.scale = sizes_of(experience, rows, self._groups, axis)
@@ -94,8 +100,8 @@ class Fit:
         ends = np.array([np.minimum(paid.min(axis=0), 0.0), np.maximum(paid.max(axis=0), 0.0)])
         most = np.append(np.ones(axis.horizon), 1.0 / (1.0 - axis.gamma**axis.width))
         self.possible = ends[..., None] * (axis.discounts * most)  # [2, C, N+1]
-        if isinstance(self.network, VectorNetwork) and self.network.num_states is None:
-            self.network.standardise(experience.frames[self._learned], alike=alike)
+        if copied is None and isinstance(new, VectorNetwork) and new.num_states is None:
+            new.standardise(experience.frames[self._learned], alike=alike)
         self.target_network = deepcopy(self.network)
         self._mean = AveragedModel(self.network)  # of the networks since learning became slower
         self.optimizer = torch.optim.Adam(

@@ -6,6 +6,9 @@ from typing import Literal, get_args
 from trdlab.errors import InputError, closest
 
 Method = Literal["mixed", "regression", "td"]
+Layers = Literal["new", "copied", "frozen"]
+"""What a network begins with, all but its last layer: new weights; those of the network by which
+the agent acts, to learn on from; or those, frozen, with layers after them that are new."""
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from copy import deepcopy
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import gymnasium as gym
 import numpy as np
@@ -87,6 +88,19 @@ class DecompositionNetwork(nn.Module):
         """
         components, logits = self.told(observations)
         return components.sum(dim=-1) if logits is None else logits
+
+    def with_outputs(self, num_actions: int, num_components: int, *, seed: int) -> Self:
+        """Returns a copy whose last layer is a new one, without a policy head.
+
+        Args:
+            num_actions: A of it.
+            num_components: N+1 of it.
+            seed: of its weights.
+        """
+        copy, rng = deepcopy(self), torch.Generator().manual_seed(seed)
+        copy.head = linear(self.head.in_features, num_actions * num_components, rng)
+        copy.num_actions, copy.num_components, copy.policy_head = num_actions, num_components, None
+        return copy.requires_grad_(True)
 
     def _by_action(self, features: Tensor) -> Tensor:
         flat: Tensor = self.head(features)  # [B, F] -> [B, A·(N+1)]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator
     from trdlab.deep.experience import Experience
     from trdlab.deep.fit import Fit
-    from trdlab.deep.fit_settings import FitProgress, FitSettings
+    from trdlab.deep.fit_settings import FitProgress, FitSettings, Layers
 
 _FITS = "fits"
 SAVE_SECONDS = 30.0
@@ -44,7 +44,7 @@ class Plan:
         steps: that it plays, at least.
         share: of its actions that are forced.
         epsilon: the chance that it takes any action, as a part of how it acts.
-        features: whether the features of its own network are read, in place of observations.
+        layers: which layers the network had before it learned (see `Layers`).
         outcomes: what else is forecast, and where it stands in `info`, or that it is a function.
         parts: those of the outcomes that add up to the reward.
         settings: how it is learned.
@@ -58,7 +58,7 @@ class Plan:
     steps: int
     share: float
     epsilon: float
-    features: bool
+    layers: "Layers"
     outcomes: Mapping[str, str]
     parts: tuple[str, ...]
     settings: "FitSettings"
@@ -80,7 +80,7 @@ class Plan:
             "steps": self.steps,
             "share": self.share,
             "epsilon": self.epsilon,
-            "features": self.features,
+            "layers": self.layers,
             "outcomes": {name: of for name, of in places.items() if name not in self.parts},
             "parts": {name: places[name] for name in self.parts},
             **asdict(self.settings),
@@ -99,7 +99,7 @@ class Plan:
             "steps": self.steps,
             "share": self.share,
             "epsilon": self.epsilon,
-            "features": self.features,
+            "layers": self.layers,
             "parts": list(self.parts),
             **asdict(self.settings),
         }
@@ -129,7 +129,7 @@ class Plan:
             steps=config["steps"],
             share=config["share"],
             epsilon=config["epsilon"],
-            features=config["features"],
+            layers=config["layers"],
             outcomes=config.get("outcomes", {}),
             parts=tuple(config["parts"]),
             settings=FitSettings(**settings),
@@ -313,7 +313,7 @@ def _save(
 def load_fit(path: Path) -> "tuple[NetworkEstimator, Interface, Plan]":
     """Returns what was fitted, the best of it so far, what its agent sees and does, and the plan.
 
-    Where it reads features, so does the estimator (see `upon`).
+    Where it reads features of frozen layers, so does the estimator (see `upon`).
 
     Raises:
         TrdlabError: something is torn.
@@ -334,7 +334,7 @@ def load_fit(path: Path) -> "tuple[NetworkEstimator, Interface, Plan]":
         hidden = tuple(size for size in state["hidden"] if size)
         rows = len(interface.action_names) * len(channels)
         space = interface.space
-        if plan.features:
+        if plan.layers == "frozen":
             space = features_space(state["q_network"]["body.0.weight"].shape[1])
         network = build_network(space, rows, plan.axis, seed=0, hidden=hidden)
         load_weights(network, state["q_network"])

@@ -53,7 +53,7 @@ def load(path: str | Path, step: int | None = None, *, joint: bool = False) -> "
     step = named if step is None else step
     if step is None and is_fit(path):
         fitted, _, plan = load_fit(path)
-        if not plan.features:
+        if plan.layers != "frozen":
             return fitted
         if (of := run_of(path)) is None:
             raise InputError(
@@ -86,7 +86,7 @@ def _upon(network: "NetworkEstimator", fit: Path) -> "NetworkEstimator":
     from trdlab.deep.features import upon
 
     fitted, _, plan = load_fit(fit)
-    return upon(network, fitted) if plan.features else fitted
+    return upon(network, fitted) if plan.layers == "frozen" else fitted
 
 
 def _loaded(folder: RunFolder, step: int | None) -> tuple[int, "NetworkEstimator"]:

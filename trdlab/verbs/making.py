@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from trdlab.errors import InputError, closest
 
@@ -15,6 +15,7 @@ _LEAST_UPDATES, _MOST_UPDATES = 1_000, 20_000  # of the fit of a run, by how muc
 if TYPE_CHECKING:
     from trdlab.agents.agent import Agent
     from trdlab.agents.places import Where
+    from trdlab.deep.fit_settings import Layers
     from trdlab.deep.settings import Kind
     from trdlab.deep.trainer import TrainMetrics
     from trdlab.environments.outcomes import Outcome
@@ -217,7 +218,7 @@ def fit_run(path: Path, **watched: Any) -> "Agent":
         width=settings.width,
         steps=settings.fit_steps,
         epsilon=settings.evaluate_epsilon,
-        features=True,
+        layers="copied",
         seed=settings.seed,
         outcomes={"life lost": LIFE_LOST} if has_lives else {},
         most_updates=max(_LEAST_UPDATES, min(_MOST_UPDATES, settings.fit_steps // 5)),
@@ -237,7 +238,7 @@ def fit(
     steps: int = 100_000,
     share: float = 0.1,
     epsilon: float = 0.0,
-    features: bool = False,
+    layers: "Layers" = "new",
     seed: int = 1,
     outcomes: "Mapping[str, Outcome | str] | None" = None,
     parts: "Mapping[str, Outcome | str] | None" = None,
@@ -263,8 +264,9 @@ def fit(
         share: the chance that an action is forced.
         epsilon: the chance of any action at random, as a part of the policy itself. Games that go
             the same way each time then do not.
-        features: whether to learn from what the last layer of the agent's own network reads, which
-            must be one of trdlab's. That takes a hundredth of the time where it sees images.
+        layers: what the network begins with, all but its last layer: `new` weights; weights
+            `copied` from the network by which the agent acts, which must be one of trdlab's; or
+            those, `frozen`: that is quicker by far where it sees images, and less exact.
         seed: of everything.
         outcomes: what else to forecast, by name: a function of a step (see `Transition`), where
             a number stands in `info`, such as `"info.fuel"`, or `"life_lost"`. What is always 0 or
@@ -286,7 +288,7 @@ def fit(
     from trdlab.deep.experience import Experience, gather
     from trdlab.deep.features import features_space, trunk_of, upon
     from trdlab.deep.fit import Fit
-    from trdlab.deep.fit_settings import FitSettings
+    from trdlab.deep.fit_settings import FitSettings, Layers
     from trdlab.environments.outcomes import Outcomes
     from trdlab.estimator import Future
     from trdlab.explanations.calibration.calibration import calibrate
@@ -303,7 +305,9 @@ def fit(
         own = frozen.estimator.time_axis.gamma if frozen.is_fitted else 0.99
     if epsilon:
         policy = EpsilonGreedy(policy, epsilon)
-    trunk = trunk_of(policy) if features else None
+    if layers not in get_args(Layers):
+        raise InputError(f"There are no '{layers}' layers.", closest(layers, get_args(Layers)))
+    trunk = None if layers == "new" else trunk_of(policy)
     at_random = f" (ε = {epsilon:g})" if epsilon else ""
     axis = TimeAxis(own if gamma is None else gamma, horizon, width)
     future = Future(f"{OWN}{at_random}")
@@ -323,7 +327,7 @@ def fit(
         steps=steps,
         share=share,
         epsilon=epsilon,
-        features=features,
+        layers=layers,
         outcomes=read.places,
         parts=tuple(made_of),
         settings=chosen,
@@ -350,15 +354,17 @@ def fit(
             max_steps=usual_limit(axis),
             seed=seed,
             outcomes=read,
-            look=trunk.features if trunk else None,
+            look=trunk.features if trunk and layers == "frozen" else None,
             tell=taken,
         )
 
     def begun(experience: Experience) -> Fit:
         space = frozen.interface.space
-        if features:
-            space = features_space(experience.frames.shape[1])
-        told: dict[str, Any] = {"names": read.names, "parts": tuple(made_of), "alike": features}
+        told: dict[str, Any] = {"names": read.names, "parts": tuple(made_of)}
+        if layers == "frozen":
+            space, told["alike"] = features_space(experience.frames.shape[1]), True
+        elif trunk is not None:
+            told["copied"] = trunk.network
         return Fit(experience, space, axis, chosen, **told)
 
     def kept() -> "RunFolder":
@@ -379,7 +385,7 @@ def fit(
             tell=watch.tell if progress else lambda now: None,
             should_stop=should_stop,
         )
-    if trunk is not None:
+    if trunk is not None and layers == "frozen":
         estimator = upon(trunk, estimator)
     called = frozen.name if out is None else Path(out).name
     return replace(frozen, name=called, estimator=estimator, policy=policy)

@@ -10,6 +10,7 @@ from trdlab.errors import InputError, closest
 
 OWN = "the agent's own policy"
 """Whose future a fitted decomposition tells."""
+_SHARE = 0.1  # of actions that are forced
 _LEAST_UPDATES, _MOST_UPDATES = 1_000, 20_000  # of the fit of a run, by how much it has played
 
 if TYPE_CHECKING:
@@ -218,7 +219,8 @@ def fit_run(path: Path, **watched: Any) -> "Agent":
         width=settings.width,
         steps=settings.fit_steps,
         epsilon=settings.evaluate_epsilon,
-        layers="copied",
+        layers="frozen",
+        share=min(_SHARE, 1.0 / settings.time_axis.num_steps),  # it acts for as long as it tells
         seed=settings.seed,
         outcomes={"life lost": LIFE_LOST} if has_lives else {},
         most_updates=max(_LEAST_UPDATES, min(_MOST_UPDATES, settings.fit_steps // 5)),
@@ -236,7 +238,7 @@ def fit(
     width: int = 1,
     gamma: float | None = None,
     steps: int = 100_000,
-    share: float = 0.1,
+    share: float = _SHARE,
     epsilon: float = 0.0,
     layers: "Layers" = "new",
     seed: int = 1,

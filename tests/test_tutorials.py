@@ -48,6 +48,8 @@ SOLUTIONS = {
     "7.2": "0.405 / 0.9**2",
     "7.3": "0.1 * 1 / 2",
     "7.4": "[0.6, 0.5, 0.3, -0.1, 0.2, 0.1].index(-0.1) - 1",
+    "8.1": "1 - 25 / 100",
+    "8.2": "0.9 * np.log(0.9 / 0.5) + 0.1 * np.log(0.1 / 0.5)",
 }
 
 
@@ -100,6 +102,7 @@ def test_lessons_are_found() -> None:
         "05_from_pixels",
         "06_debug_an_agent",
         "07_explain_your_own",
+        "08_from_a_teacher",
     ]
 
 

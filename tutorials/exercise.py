@@ -331,6 +331,25 @@ EXERCISES = {
             (0, "Better than a guess is enough: 0.3 is far above 0."),
         ),
     ),
+    "8.1": Exercise(
+        right=1 - (27 - 2) / (102 - 2),
+        hint="It is 1 where the student plays like chance, and 0 where it plays like the teacher.",
+        mistakes=(
+            (0.25, "That is how far the student has come. What is left weighs."),
+            (1 - 27 / 102, "Count from what random actions reach, not from 0."),
+        ),
+    ),
+    "8.2": Exercise(
+        right=0.9 * np.log(0.9 / 0.5) + 0.1 * np.log(0.1 / 0.5),
+        hint="Sum over both actions. A chance that is left belongs to the other action.",
+        mistakes=(
+            (0.9 * np.log(0.9 / 0.5), "There is another action: add it."),
+            (
+                0.5 * np.log(0.5 / 0.9) + 0.5 * np.log(0.5 / 0.1),
+                "That is the other way round: p is the teacher's.",
+            ),
+        ),
+    ),
 }
 
 

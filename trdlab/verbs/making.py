@@ -220,7 +220,7 @@ def fit_run(path: Path, **watched: Any) -> "Agent":
         steps=settings.fit_steps,
         epsilon=settings.evaluate_epsilon,
         layers="frozen",
-        share=min(_SHARE, 1.0 / settings.time_axis.num_steps),  # it acts for as long as it tells
+        share=min(_SHARE, 1.0 / max(settings.time_axis.num_steps, 1)),  # it acts as far as it tells
         seed=settings.seed,
         outcomes={"life lost": LIFE_LOST} if has_lives else {},
         most_updates=max(_LEAST_UPDATES, min(_MOST_UPDATES, settings.fit_steps // 5)),

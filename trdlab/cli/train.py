@@ -302,7 +302,8 @@ def _carry_on(
     if settings.evaluate_episodes:
         result = _evaluate(path)
         if run.trainer.lessons:
-            _say(errors, reached_line(float(result.returns.mean()), run.trainer.lessons.levels))
+            means = result.mean.value, result.interquartile_mean.value
+            _say(errors, reached_line(*means, run.trainer.lessons.levels))
         else:
             _compare_with_chance(run.folder, result, settings)
     if settings.fit and own_fit(path, None) is None:

@@ -52,6 +52,14 @@ class Levels:
                 "Choose a teacher that is better than chance.",
             )
 
+    def share(self, score: float) -> float:
+        """Returns how much of the way from chance to the teacher a score is: teacher-normalised.
+
+        >>> Levels(teacher=18.0, chance=-22.0).share(-2.0)
+        0.5
+        """
+        return (score - self.chance) / (self.teacher - self.chance)
+
     def weight(self, student: float | None) -> float:
         """Returns λ: 1 at the level of chance, 0 at the teacher's, and in proportion between.
 
@@ -62,8 +70,7 @@ class Levels:
         """
         if student is None:
             return 1.0
-        reached = (student - self.chance) / (self.teacher - self.chance)
-        return min(1.0, max(0.0, 1.0 - reached))
+        return min(1.0, max(0.0, 1.0 - self.share(student)))
 
 
 class Lessons:
@@ -91,6 +98,14 @@ class Lessons:
         if self.teacher_steps < self.settings.teacher_steps:
             return "teacher"
         return "offline" if self.offline_updates < self.settings.offline_updates else "online"
+
+    def share(self, score: float) -> float:
+        """Returns how much of the way from chance to the teacher a score is: teacher-normalised.
+
+        >>> Levels(teacher=18.0, chance=-22.0).share(-2.0)
+        0.5
+        """
+        return (score - self.chance) / (self.teacher - self.chance)
 
     def weight(self, student: float | None) -> float:
         """Returns what the teacher's probabilities weigh in an update."""

@@ -159,17 +159,21 @@ def teacher_line(settings: TrainSettings, levels: Levels) -> str:
     )
 
 
-def reached_line(mean: float, levels: Levels) -> str:
+def reached_line(mean: float, middle: float, levels: Levels) -> str:
     """Returns how far an agent has come on the way from chance to its teacher.
 
-    >>> reached_line(380.0, Levels(teacher=500.0, chance=20.0))
-    'Of the way from random actions (20.0) to its teacher (500.0) it has come 75 %.'
+    Args:
+        mean: its mean return.
+        middle: its interquartile mean.
+        levels: chance and teacher.
+
+    >>> reached_line(380.0, 404.0, Levels(teacher=500.0, chance=20.0))[-73:]
+    'to its teacher (500.0) it has come 75 % (by the interquartile mean 80 %).'
     """
-    come = (mean - levels.chance) / (levels.teacher - levels.chance)
     ends = (_number(of, _decimals(of)) for of in (levels.chance, levels.teacher))
-    return "Of the way from random actions ({}) to its teacher ({}) it has come {:.0%}.".format(
-        *ends, come
-    ).replace("%.", " %.")
+    way = "Of the way from random actions ({}) to its teacher ({}) it has come".format(*ends)
+    come = (f"{100.0 * levels.share(of):.0f} %" for of in (mean, middle))
+    return "{} {} (by the interquartile mean {}).".format(way, *come)
 
 
 def human_line(game: str, mean: float) -> str:

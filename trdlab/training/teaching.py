@@ -138,6 +138,22 @@ def measure(
     return Levels(teacher.value, chance.value), {_TEACHER: noted}
 
 
+def levels_noted(folder: RunFolder) -> tuple[Levels, str | None]:
+    """Returns the levels that were measured when a run began, and the sha256 of the teacher's file.
+
+    Raises:
+        TrdlabError: the manifest is torn, or there was no teacher.
+    """
+    try:
+        noted = folder.manifest[_TEACHER]
+        return Levels(float(noted["score"]), float(noted["random"])), noted["sha256"]
+    except (LookupError, TypeError, ValueError) as error:
+        raise TrdlabError(
+            f"The run '{folder.path}' does not say what its teacher reached: its manifest is torn.",
+            "Put back the manifest.json that was written when it began.",
+        ) from error
+
+
 def levels_of(folder: RunFolder, candidate: Candidate) -> Levels:
     """Returns the levels that were measured when a run began.
 
@@ -145,14 +161,7 @@ def levels_of(folder: RunFolder, candidate: Candidate) -> Levels:
         InputError: the teacher is another one now.
         TrdlabError: the manifest is torn.
     """
-    try:
-        noted = folder.manifest[_TEACHER]
-        levels, sha256 = Levels(float(noted["score"]), float(noted["random"])), noted["sha256"]
-    except (LookupError, TypeError, ValueError) as error:
-        raise TrdlabError(
-            f"The run '{folder.path}' does not say what its teacher reached: its manifest is torn.",
-            "Put back the manifest.json that was written when it began.",
-        ) from error
+    levels, sha256 = levels_noted(folder)
     if candidate.sha256 != sha256:
         raise InputError(
             f"The run '{folder.path}' began with another teacher than '{candidate.name}' is now.",

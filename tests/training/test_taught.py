@@ -402,14 +402,14 @@ def test_a_game_is_played_as_the_teacher_knows_it(tmp_path):
 
 
 def test_with_a_teacher_the_presets_do_not_begin_at_random(tmp_path):
-    taught = read_settings("atari", "Breakout", None, None, {"teacher": "a.pt"})
+    taught = read_settings("atari", "Breakout", "paper", None, {"teacher": "a.pt"})
     assert (taught.epsilon_start, taught.learning_starts) == (0.01, 10_000)
     assert (taught.teacher_steps, taught.offline_updates) == (100_000, 30_000)
     small = read_settings(
         "gym", "CartPole-v1", "smoke", None, {"teacher": "a", "teacher_steps": 99}
     )
     assert (small.teacher_steps, small.offline_updates) == (99, 1_250)
-    assert read_settings("atari", "Breakout", None, None, {}).epsilon_start == 1.0
+    assert read_settings("atari", "Breakout", "paper", None, {}).epsilon_start == 1.0
     (tmp_path / "lines.toml").write_text('teacher = "a"\nepsilon_start = 0.5\n')
     told = read_settings("gym", "CartPole-v1", None, tmp_path / "lines.toml", {})
     assert (told.epsilon_start, told.teacher_steps) == (0.5, 20_000)
@@ -429,7 +429,7 @@ def test_the_command_tells_whom_it_learns_from_and_how_far_it_has_come(named, tm
     assert re.search(r"Teacher: agents\.py:pole reaches [\d.]+, random actions 2[\d.]+\. A policy "
                      r"head learns what it does\.", err)  # fmt: skip
     assert re.search(r"Of the way from random actions \(2[\d.]+\) to its teacher \([\d.]+\) it has "
-                     r"come -?\d+ %\.", err)  # fmt: skip
+                     r"come -?\d+ % \(by the interquartile mean -?\d+ %\)\.", err)  # fmt: skip
     assert "4 episodes, by its policy head, seed 1000" in out
 
 

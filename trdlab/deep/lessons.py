@@ -99,14 +99,6 @@ class Lessons:
             return "teacher"
         return "offline" if self.offline_updates < self.settings.offline_updates else "online"
 
-    def share(self, score: float) -> float:
-        """Returns how much of the way from chance to the teacher a score is: teacher-normalised.
-
-        >>> Levels(teacher=18.0, chance=-22.0).share(-2.0)
-        0.5
-        """
-        return (score - self.chance) / (self.teacher - self.chance)
-
     def weight(self, student: float | None) -> float:
         """Returns what the teacher's probabilities weigh in an update."""
         fallen = self.levels.weight(student) if self.phase == "online" else 1.0

@@ -27,6 +27,7 @@ from trdlab.policies import EpsilonGreedy, Policy, acting
 from trdlab.policies.adapted import About, games_for
 from trdlab.policies.files import Options
 from trdlab.policies.functions import PYTHON, from_python
+from trdlab.policies.hub import HUB, from_hub
 from trdlab.policies.registry import read_policy
 from trdlab.runs import RunFolder, find_checkpoint
 from trdlab.runs.folder import is_fit
@@ -60,7 +61,8 @@ def find_agent(
     model, `gridworld:NAME`, a map file, or `tabular:ENV_ID`, each with what to make it with after
     commas, such as `gridworld:ledge,slip=0.2`; a file of an agent that another library trained,
     likewise with what it does not say, such as `ppo.zip,activation=relu,greedy=true` (see
-    `Options`); or `python:FILE.py:FUNCTION`, whose function makes one.
+    `Options`), or such a file on the Hugging Face hub, `hf:OWNER/REPO@REVISION`; or
+    `python:FILE.py:FUNCTION`, whose function makes one.
 
     Args:
         name: of the agent.
@@ -80,7 +82,7 @@ def find_agent(
         made = _made if name.startswith(PYTHON) else _exact
         return made(name, env, env_arguments, changed(AXIS, gamma, horizon, width))
     _refuse_model(name)
-    is_file = Path(name.partition(",")[0]).is_file()
+    is_file = name.startswith(HUB) or Path(name.partition(",")[0]).is_file()
     if (gamma, horizon, width) != (None, None, None):
         own = _UNKNOWN_AXIS if is_file else _OWN_AXIS
         raise InputError(f"'{name}' {own}", _LEAVE_OUT)
@@ -198,7 +200,7 @@ def _made(name: str, env: Where | None, env_arguments: Sequence[str], axis: Time
 def _read(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
     """Returns the agent in a file of another library, named with what that does not say."""
     file, arguments = parse_name(name)
-    path = Path(file)
+    path = from_hub(file) if file.startswith(HUB) else Path(file)
 
     def num_actions() -> int | None:
         if env is None:

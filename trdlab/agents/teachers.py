@@ -10,6 +10,7 @@ from trdlab.errors import InputError
 from trdlab.policies import Policy, acting
 from trdlab.policies.adapted import games_for
 from trdlab.policies.functions import PYTHON
+from trdlab.policies.hub import HUB, from_hub
 from trdlab.runs import RunFolder, find_checkpoint
 from trdlab.runs.folder import is_fit, is_run
 from trdlab.runs.keeping import all_saved
@@ -64,6 +65,8 @@ def _placed(name: str) -> tuple[str, Path | None]:
         file = Path(source).resolve()
         return f"{PYTHON}{file}:{function}", file if file.is_file() else None
     first, comma, rest = name.partition(",")
+    if first.startswith(HUB):
+        return name, from_hub(first)
     if Path(first).is_file():
         file = Path(first).resolve()
         return f"{file}{comma}{rest}", file

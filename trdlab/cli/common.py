@@ -46,7 +46,8 @@ WhoseTies = Annotated[Ties, typer.Option("--ties", help="Whose future, where opt
 Plot = Annotated[Path | None, typer.Option("--plot", help="Write a picture: .png, .pdf or .svg.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")]
 AGENT = (
-    "A run's folder, RUN@STEP or RUN@best for another checkpoint of it; the folder of a fit; an "
+    "A run's folder, RUN@STEP or RUN@best for another checkpoint of it; pretrained:GAME, which "
+    "comes with trdlab; the folder of a fit; an "
     "exact table: gridworld:NAME, a map file, or tabular:ENV_ID, with arguments after commas, such "
     "as gridworld:ledge,slip=0.2; or an agent of another library, as trdlab agent reads it."
 )

@@ -18,6 +18,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
+import numpy as np
 import pytest
 import torch
 from rich.console import Console
@@ -28,8 +29,10 @@ from trdlab.cli.options import flag
 from trdlab.cli.progress import EpisodeProgress, TrainingProgress, stopping
 from trdlab.deep.presets import PRESETS, preset, with_teacher
 from trdlab.rollouts.playing import Progress
-from trdlab.runs import RunFolder, checkpoint_steps
+from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
+from trdlab.training.fitted import Stopped
 from trdlab.training.loading import load
+from trdlab.verbs.making import fit_run
 
 Outcome = tuple[int, str, str]
 Trdlab = Callable[..., Outcome]
@@ -629,3 +632,34 @@ def test_a_run_that_will_learn_nothing_says_so(trdlab, tmp_path):
     code, _, err = trdlab(*words, "--out", tmp_path / "run")
     assert (code, line in err.splitlines()) == (0, True)
     assert line in trdlab(*words, "--dry-run")[1].splitlines()
+
+
+def test_a_run_that_fits_ends_with_how_far_that_can_be_trusted(trdlab, tmp_path):
+    out = tmp_path / "run"
+    words = ["train", "gym", "CartPole-v1", *SMALL, "--fit", "--fit-steps=600", "--out", out]
+    code, said, err = trdlab(*words)
+    assert code == 0, err
+    fit = out / "fits" / "000000120"
+    assert f"Kept: {fit}" in err
+    assert "Over 50 episodes the agent scored" in said
+    assert f"Try: trdlab explain {out}" in " ".join(said.split())
+    before = {path: path.read_bytes() for path in fit.rglob("*") if path.is_file()}
+    code, said, err = trdlab("resume", out)  # there is nothing left to do
+    assert (code, "Kept: " + str(fit) in err) == (0, False)
+    assert {path: path.read_bytes() for path in fit.rglob("*") if path.is_file()} == before
+
+
+def test_a_fit_that_was_stopped_goes_on_with_its_run(trdlab, tmp_path):
+    out = tmp_path / "run"
+    few = [*SMALL, "--fit-steps=600", "--evaluate-episodes=0", "--out", out]
+    assert trdlab("train", "gym", "CartPole-v1", *few, "--fit")[0] == 0
+    fit, whole = out / "fits" / "000000120", tmp_path / "whole"
+    shutil.move(fit, whole)
+    rounds = iter([False, False, True])
+    with pytest.raises(Stopped, match=r"Stopped at [\d,]+ updates"):
+        fit_run(out, should_stop=lambda: fit.exists() and next(rounds))
+    code, _, err = trdlab("resume", fit)
+    assert code == 0, err
+    for name in ("q_network", "possible"):
+        one, other = (read_arrays(RunFolder.open(of), name)[1] for of in (fit, whole))
+        assert all(np.array_equal(one[key], other[key]) for key in one | other)

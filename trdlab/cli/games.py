@@ -8,14 +8,20 @@ def games(as_json: common.AsJson = False) -> None:
     from rich.text import Text
 
     from trdlab.atari import game_names
+    from trdlab.runs.pretrained import pretrained_names
     from trdlab.show.text import columns
 
-    names = game_names()
+    names, trained = game_names(), pretrained_names()
     if as_json:
-        common.print_json({"schema": "trdlab.games/1", "games": list(names)})
+        told = {"schema": "trdlab.games/1", "games": list(names), "pretrained": list(trained)}
+        common.print_json(told)
         return
     wide = max(map(len, names)) + 2
     beside = max(columns() // wide, 1)
     high = -(-len(names) // beside)
     lines = ("".join(f"{name:<{wide}}" for name in names[row::high]) for row in range(high))
     common.print_text(Text("\n".join(line.rstrip() for line in lines)))
+    if trained:
+        common.print_line(
+            f"\nA trained agent comes along of: {', '.join(trained)} (pretrained:GAME)."
+        )

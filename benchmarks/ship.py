@@ -5,7 +5,7 @@ beside it; so do the components as they were learned with the policy. Of the tea
 file stays, its sha256, and where it is from. It takes some minutes for a game.
 
     python benchmarks/ship.py runs/breakout --origin "greydanus/baby-a3c, MIT"
-    python benchmarks/ship.py                   # a table of all that comes with trdlab
+    python benchmarks/ship.py --plot skills.png  # a table of all that comes with trdlab
 """
 
 import argparse
@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 import trdlab
 from trdlab.agents.agent import Agent
@@ -27,6 +29,7 @@ from trdlab.errors import InputError
 from trdlab.runs import RunFolder, load_checkpoint, read_metrics, save_checkpoint, to_toml
 from trdlab.runs.folder import CONFIG, MANIFEST
 from trdlab.runs.pretrained import SHIPPED
+from trdlab.show.plots import style
 from trdlab.training.fitted import fit_path
 from trdlab.training.loading import chosen_step, evaluate_run, own_fit, run_settings
 from trdlab.training.teaching import levels_noted
@@ -39,6 +42,8 @@ def main() -> None:
     options = _options()
     if options.run is None:
         print(table(options.out))
+        if options.plot:
+            style.save(skills(options.out), options.plot)
         return
     folder = RunFolder.open(options.run)
     game, step = run_settings(folder).env, chosen_step(folder)
@@ -124,17 +129,10 @@ def card(path: Path, run: Path) -> dict[str, Any]:
 
 
 def judged(agent: Agent) -> dict[str, Any]:
-    """Returns how far an agent's forecasts can be trusted, and the skill of single ones."""
+    """Returns how far an agent's forecasts can be trusted, and the skill of each component."""
     found = trdlab.calibrate(agent).calibration
-    skill = found.skill
-    shown = [k for k in SHOWN if k < len(skill.value)]
-    return {
-        "trusted to": found.trust.last_step,
-        "above zero": [bool(low > 0.0) for low in skill.low[: agent.estimator.time_axis.horizon]],
-        "skill": {
-            f"t+{k}": [float(of[k]) for of in (skill.value, skill.low, skill.high)] for k in shown
-        },
-    }
+    skill = {name: of[:-1].round(4).tolist() for name, of in asdict(found.skill).items()}
+    return {"trusted to": found.trust.last_step, "skill": skill}
 
 
 def table(folder: Path) -> str:
@@ -144,21 +142,48 @@ def table(folder: Path) -> str:
         " at t, t+5, t+20, t+39 | learned with the policy |",
         "|---|---|--:|--:|--:|--:|---|---|",
     ]
-    for game in sorted(path.parent.name for path in folder.glob(f"*/{CARD}")):
-        of = json.loads((folder / game / CARD).read_text(encoding="utf-8"))
-        cells = [game, of["teacher"]["origin"], f"{of['teacher']['score']:.1f}"]
+    for of in cards_in(folder):
+        cells = [of["game"], of["teacher"]["origin"], f"{of['teacher']['score']:.1f}"]
         cells += ["{value:.1f} ({low:.1f} … {high:.1f})".format(**of["mean"])]
         cells += [f"{of['teacher-normalised']:.2f}", f"t+{of['fitted']['trusted to']}"]
         for which in ("fitted", "joint"):
-            cells.append(" · ".join(f"{value:.2f}" for value, _, _ in of[which]["skill"].values()))
+            skill = of[which]["skill"]["value"]
+            cells.append(" · ".join(f"{skill[k]:.2f}" for k in SHOWN if k < len(skill)))
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+@style.settings()
+def skills(folder: Path) -> Figure:
+    """Returns a picture of how good forecasts are, step by step: a panel for each game."""
+    cards = cards_in(folder)
+    figure = style.new_figure(0.9 + 1.9 * len(cards))
+    for ax, of in zip(figure.subplots(len(cards), 1, squeeze=False).flat, cards, strict=True):
+        for which, colour in zip(("fitted", "joint"), style.AGENTS, strict=True):
+            skill = of[which]["skill"]
+            steps = range(len(skill["value"]))
+            ax.plot(steps, skill["value"], color=colour)
+            ax.fill_between(steps, skill["low"], skill["high"], color=colour, alpha=0.2, lw=0)
+        ax.axhline(0.0, color=style.MUTED, lw=0.8)
+        ax.set(title=of["game"], ylim=(-1.0, 1.0), ylabel="skill")
+    ax.set_xlabel("steps from the action")
+    told = zip(style.AGENTS, ("fitted afterwards", "learned with the policy"), strict=True)
+    marks = [Line2D([], [], color=colour, label=label) for colour, label in told]
+    style.add_legend(figure, marks, "1: perfect, 0: no better than a guess; with 95 % intervals")
+    return figure
+
+
+def cards_in(folder: Path) -> list[dict[str, Any]]:
+    """Returns the cards of all agents in a folder, by the names of their games."""
+    paths = sorted(folder.glob(f"*/{CARD}"))
+    return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("run", type=Path, nargs="?")
     parser.add_argument("--origin", help="Of its teacher: where from, and under which licence.")
+    parser.add_argument("--plot", type=Path, help="Draw the skill of each step of all of them.")
     parser.add_argument("--out", type=Path, default=SHIPPED)
     return parser.parse_args()
 

@@ -58,9 +58,9 @@ student = trdlab.train(
     "MountainCar-v0",
     out=folder / "student",
     teacher=teacher,
-    teacher_steps=10_000,
-    offline_updates=3_000,
-    agent_steps=3_000,
+    teacher_steps=8_000,
+    offline_updates=2_500,
+    agent_steps=2_000,
     evaluate_episodes=0,
     checkpoint_episodes=0,
 )
@@ -85,9 +85,9 @@ print(student.estimator.future.policy)
 # true? The score cannot tell. Hold them against what really came:
 
 # %%
-joint = trdlab.calibrate(student, episodes=30)
-fitted = trdlab.fit(student, horizon=10, steps=20_000, layers="copied")
-afterwards = trdlab.calibrate(fitted, episodes=30)
+joint = trdlab.calibrate(student, episodes=20)
+fitted = trdlab.fit(student, horizon=10, steps=10_000, layers="copied")
+afterwards = trdlab.calibrate(fitted, episodes=20)
 
 print("                skill at t+5    t+9   trusted to")
 for name, of in {"with the policy": joint, "afterwards": afterwards}.items():

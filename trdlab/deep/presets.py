@@ -61,7 +61,7 @@ PRESETS["atari"]["cpu"] = (
         "learning_starts": 20_000,
         "capacity": 200_000,
         "precision": "auto",
-        "fit_steps": 200_000,
+        "fit_steps": 120_000,
     },
 )
 PRESETS["atari"]["gpu"] = (
@@ -72,7 +72,7 @@ PRESETS["atari"]["gpu"] = (
         "update_every": 64,
         "batch_size": 512,  # as many windows a step as DQN
         "target_sync_updates": 62,  # as many steps as in the paper, nearly
-        "fit_steps": 200_000,
+        "fit_steps": 120_000,
         "precision": "auto",
     },
 )

@@ -51,7 +51,7 @@ print(f"The teacher: {score.value:.0f} ({score.low:.0f} to {score.high:.0f})")
 #
 # Three things happen, one after the other. The teacher drives, and each of its steps is remembered.
 # Then a network learns from that, without driving. Then the network drives, and the teacher looks
-# on; what it says weighs less, the nearer the network's score comes to its own.
+# on, and says what it would have done.
 
 # %%
 student = trdlab.train(
@@ -141,8 +141,11 @@ moment.plot()
 # %% [markdown]
 # ## Your turn
 #
-# **Exercise 8.1.** Random actions reach 2 points in a game, the teacher 102, and the student has 27
-# so far. How much does the teacher still weigh, where 1 is all and 0 is nothing?
+# **Exercise 8.1.** Where a teacher has values, such as a DQN, these are learned, and the student can
+# become better than its teacher. So the teacher weighs 1 while the student is no better than random
+# actions, 0 where it has come to the teacher's score, and in proportion in between. Random actions
+# reach 2 points in a game, the teacher 102, and the student has 27 so far. What does the teacher
+# weigh?
 
 # %%
 answer_1 = None  # replace with a number

@@ -60,7 +60,7 @@ def test_a_game_is_learned_from_the_agent_that_comes_with_trdlab(shipped):
     assert shipped_teacher("gym", "Breakout") is None
     taught = read_settings("atari", "Breakout", "cpu", None, {})
     assert taught.teacher == "pretrained:Breakout"
-    assert (taught.agent_steps, taught.offline_updates) == (10_000, 10_000)
+    assert (taught.agent_steps, taught.offline_updates) == (20_000, 10_000)
     alone = read_settings("atari", "Breakout", "cpu", None, {}, from_scratch=True)
     other = read_settings("atari", "Pong", "cpu", None, {})
     assert alone.teacher is other.teacher is None

@@ -100,8 +100,12 @@ class Lessons:
         return "offline" if self.offline_updates < self.settings.offline_updates else "online"
 
     def weight(self, student: float | None) -> float:
-        """Returns what the teacher's probabilities weigh in an update."""
-        fallen = self.levels.weight(student) if self.phase == "online" else 1.0
+        """Returns what the teacher's probabilities weigh in an update.
+
+        They alone teach a policy head, so for that they go on to weigh what they do.
+        """
+        has_own = self.phase == "online" and self.settings.distil == "values"
+        fallen = self.levels.weight(student) if has_own else 1.0
         return self.settings.distillation * fallen
 
     def ask(self, environments: Environments, stack: FrameStack) -> Lesson:

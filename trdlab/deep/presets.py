@@ -160,7 +160,8 @@ PRESETS["gym"] |= {
 }
 _TAUGHT: dict[str, Config] = {
     "cpu": {
-        "agent_steps": 10_000,
+        "agent_steps": 20_000,
+        "learning_starts": 5_000,
         "offline_updates": 10_000,  # three times each step: with more, it learns them by heart
         "learning_rate": 7e-4,  # what a teacher does stays the same, and may be learned fast
         "learning_rate_end": 1e-5,

@@ -141,11 +141,11 @@ moment.plot()
 # %% [markdown]
 # ## Your turn
 #
-# **Exercise 8.1.** Where a teacher has values, such as a DQN, these are learned, and the student can
-# become better than its teacher. So the teacher weighs 1 while the student is no better than random
-# actions, 0 where it has come to the teacher's score, and in proportion in between. Random actions
-# reach 2 points in a game, the teacher 102, and the student has 27 so far. What does the teacher
-# weigh?
+# **Exercise 8.1.** Where a teacher has values, such as a DQN, these are learned, and the student
+# can become better than its teacher. So the teacher weighs 1 while the student is no better than
+# random actions, 0 where it has come to the teacher's score, and in proportion in between. Random
+# actions reach 2 points in a game, the teacher 102, and the student has 27 so far. What does the
+# teacher weigh?
 
 # %%
 answer_1 = None  # replace with a number

@@ -146,7 +146,7 @@ class TrainSettings:
     )
     distillation: float = option(
         1.0,
-        "Weight of the teacher in the loss; that of values falls to 0 as the score reaches its own.",
+        "Weight of the teacher in the loss; that of values falls to 0 as the score comes to its.",
         TEACHING,
         least=0,
     )

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from trdlab.deep.settings import TrainSettings
 
 # a game is long, and a copy plays all of it again
-_OF_GAMES = Copying(judged=16, episodes=12, moments=2, copies=2, tries=10)
+_OF_GAMES = Copying(judged=16, episodes=12, moments=2, copies=2, tries=10, unasked=False)
 
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""

@@ -20,8 +20,9 @@ def games(as_json: common.AsJson = False) -> None:
     beside = max(columns() // wide, 1)
     high = -(-len(names) // beside)
     lines = ("".join(f"{name:<{wide}}" for name in names[row::high]) for row in range(high))
-    common.print_text(Text("\n".join(line.rstrip() for line in lines)))
+    told = "\n".join(line.rstrip() for line in lines)
+    common.print_text(Text(f"{told}\n" if trained else told))
     if trained:
         common.print_line(
-            f"\nA trained agent comes along of: {', '.join(trained)} (pretrained:GAME)."
+            f"A trained agent comes along of: {', '.join(trained)} (pretrained:GAME)."
         )

@@ -166,7 +166,8 @@ def explain(
         _check_report(report, agent, episodes)
     elif "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
-    copying = agent.copying if {"calibration", "contrast"} & set(wanted) else None
+    is_usual = agent.copying.unasked and {"calibration", "contrast"} & set(wanted)
+    copying = agent.copying if is_usual or "calibration" in parts else None
     choice, observation, tried, story = None, None, None, None
     missing: list[str] = []
     with agent.begin(seed=seed, max_steps=limit) as recording:

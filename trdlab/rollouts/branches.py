@@ -46,6 +46,7 @@ class Copying:
         moments: how many states of each are copied, about.
         copies: how often each is.
         tries: how often each of two actions is tried at a state.
+        unasked: whether an explanation copies to judge forecasts where nobody has asked for that.
     """
 
     judged: int = 50
@@ -53,6 +54,7 @@ class Copying:
     moments: int = 5
     copies: int = 8
     tries: int = 50
+    unasked: bool = True
 
 
 @dataclass(frozen=True)

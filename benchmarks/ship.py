@@ -165,7 +165,7 @@ def skills(folder: Path) -> Figure:
             ax.plot(steps, skill["value"], color=colour)
             ax.fill_between(steps, skill["low"], skill["high"], color=colour, alpha=0.2, lw=0)
         ax.axhline(0.0, color=style.MUTED, lw=0.8)
-        ax.set(title=of["game"], ylim=(-1.0, 1.0), ylabel="skill")
+        ax.set(title=of["game"], ylim=(-0.3, 1.0), ylabel="skill")
     ax.set_xlabel("steps from the action")
     told = zip(style.AGENTS, ("fitted afterwards", "learned with the policy"), strict=True)
     marks = [Line2D([], [], color=colour, label=label) for colour, label in told]

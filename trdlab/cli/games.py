@@ -20,8 +20,8 @@ def games(as_json: common.AsJson = False) -> None:
     beside = max(columns() // wide, 1)
     high = -(-len(names) // beside)
     lines = ("".join(f"{name:<{wide}}" for name in names[row::high]) for row in range(high))
-    told = "\n".join(line.rstrip() for line in lines)
-    common.print_text(Text(f"{told}\n" if trained else told))
+    listed = "\n".join(line.rstrip() for line in lines)
+    common.print_text(Text(f"{listed}\n" if trained else listed))
     if trained:
         common.print_line(
             f"A trained agent comes along of: {', '.join(trained)} (pretrained:GAME)."

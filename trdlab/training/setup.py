@@ -125,7 +125,7 @@ def course_line(settings: TrainSettings) -> str:
             "From scratch a CPU takes hours for a million steps, and in these few games get far: "
             "--teacher takes less."
         )
-    return "With a teacher it takes about half an hour on two cores."
+    return "With a teacher it takes about twenty minutes on two cores."
 
 
 def _lines_of(config: Path) -> dict[str, Any]:

@@ -27,10 +27,10 @@ from trdlab.agents.naming import find_agent
 from trdlab.atari.published import human_normalised
 from trdlab.errors import InputError
 from trdlab.runs import RunFolder, load_checkpoint, read_metrics, save_checkpoint, to_toml
+from trdlab.runs.fits import fit_path
 from trdlab.runs.folder import CONFIG, MANIFEST
 from trdlab.runs.pretrained import SHIPPED
 from trdlab.show.plots import style
-from trdlab.training.fitted import fit_path
 from trdlab.training.loading import chosen_step, evaluate_run, own_fit, run_settings
 from trdlab.training.teaching import levels_noted
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from trdlab.time_axis import TimeAxis
     from trdlab.training.loading import load
     from trdlab.verbs.asking import calibrate, compare, explain
-    from trdlab.verbs.making import agent, fit, solve, train
+    from trdlab.verbs.fitting import fit
+    from trdlab.verbs.making import agent, solve, train
 
 __version__ = "0.1.0"
 __all__ = [

@@ -32,7 +32,7 @@ from trdlab.rollouts.playing import Progress
 from trdlab.runs import RunFolder, checkpoint_steps, read_arrays
 from trdlab.training.fitted import Stopped
 from trdlab.training.loading import load
-from trdlab.verbs.making import fit_run
+from trdlab.verbs.fitting import fit_run
 
 Outcome = tuple[int, str, str]
 Trdlab = Callable[..., Outcome]

@@ -14,8 +14,9 @@ from trdlab.agents.naming import find_agent
 from trdlab.deep.features import trunk_of, upon
 from trdlab.errors import InputError
 from trdlab.policies import EpsilonGreedy
-from trdlab.training.fitted import fit_path, load_fit
-from trdlab.verbs.making import fit_run
+from trdlab.runs.fits import fit_path
+from trdlab.training.fitted import load_fit
+from trdlab.verbs.fitting import fit_run
 
 FEW: dict[str, Any] = {"agent_steps": 600, "gamma": 0.9, "N": 4, "hidden": [16], "fit_steps": 2_000}
 

@@ -30,11 +30,12 @@ from trdlab.policies.functions import PYTHON, from_python
 from trdlab.policies.hub import HUB, from_hub
 from trdlab.policies.registry import read_policy
 from trdlab.runs import RunFolder, find_checkpoint
+from trdlab.runs.fits import run_of
 from trdlab.runs.folder import is_fit
 from trdlab.runs.pretrained import is_shipped
 from trdlab.tabular.toytext import toy_text_ids
 from trdlab.time_axis import TimeAxis
-from trdlab.training.fitted import Plan, load_fit, run_of
+from trdlab.training.fitted import Plan, load_fit
 
 if TYPE_CHECKING:
     from trdlab.deep.estimator import NetworkEstimator

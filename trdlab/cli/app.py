@@ -19,7 +19,7 @@ COMMANDS = {
     "games": "trdlab.cli.games",
     "train": "trdlab.cli.train",
     "resume": "trdlab.cli.train",
-    "evaluate": "trdlab.cli.train",
+    "evaluate": "trdlab.cli.evaluate",
     "runs": "trdlab.cli.runs",
     "study": "trdlab.cli.study",
 }

@@ -195,6 +195,11 @@ def print_page(thing: Any, *, details: bool) -> None:
         print_line(_GUIDE, "dim")
 
 
+def say(console: Console, text: str) -> None:
+    """Prints a line as it is, to be copied whole."""
+    console.print(text, soft_wrap=True, markup=False)
+
+
 def print_line(line: str, style: str = "") -> None:
     """Prints a line, wrapped to the terminal."""
     from trdlab.show.text import columns, wrapped

@@ -118,7 +118,8 @@ def fit(
 def go_on(path: Path) -> None:
     """Goes on with a fit that was stopped."""
     from trdlab.runs import RunFolder
-    from trdlab.training.fitted import Plan, run_of
+    from trdlab.runs.fits import run_of
+    from trdlab.training.fitted import Plan
 
     if (of_run := run_of(path)) is not None:
         fit_run(of_run[0])
@@ -137,9 +138,9 @@ def go_on(path: Path) -> None:
 def fit_run(path: Path) -> None:
     """Fits the agent of a run, in its folder, and says how far that can be trusted."""
     from trdlab.runs import RunFolder
-    from trdlab.training.fitted import fit_path
+    from trdlab.runs.fits import fit_path
     from trdlab.training.loading import chosen_step
-    from trdlab.verbs.making import fit_run as fit_in_folder
+    from trdlab.verbs.fitting import fit_run as fit_in_folder
 
     out = fit_path(path, chosen_step(RunFolder.open(path)))
     _told(lambda **watched: fit_in_folder(path, **watched), out, path)

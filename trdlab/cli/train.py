@@ -1,4 +1,4 @@
-"""`trdlab train`, `resume`, `evaluate`: a network that decomposes, start to score."""
+"""`trdlab train` and `resume`: a network that decomposes, start to score."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -6,16 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from trdlab.cli import common
+from trdlab.cli.evaluate import RunPath, checkpoint_option, compare_with_chance, evaluated, named
 from trdlab.cli.options import with_settings
 from trdlab.deep.presets import PRESETS
 
 if TYPE_CHECKING:
     from trdlab.deep.settings import Kind, TrainSettings
-    from trdlab.rollouts.evaluation import Evaluation
-    from trdlab.runs import RunFolder
     from trdlab.training.run import Run
 
 train = typer.Typer(help="Train a network that decomposes.", no_args_is_help=True)
@@ -47,21 +45,7 @@ Out = Annotated[
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say what it would take, and write nothing.")
 ]
-RunPath = Annotated[
-    Path,
-    typer.Argument(
-        metavar="RUN", help="The run's folder; RUN@STEP or RUN@best for another checkpoint."
-    ),
-]
-
-
-def _checkpoint(shown: str) -> Any:
-    """Returns the option that names a checkpoint."""
-    return typer.Option("--checkpoint", metavar="STEP", help="Another one.", show_default=shown)
-
-
-Newest = Annotated[int | None, _checkpoint("the newest")]
-OfAgent = Annotated[int | None, _checkpoint("that of the run's agent")]
+Newest = Annotated[int | None, checkpoint_option("the newest")]
 
 
 @train.command(name="gym")
@@ -140,7 +124,7 @@ def resume(
     from trdlab.runs.folder import is_fit
     from trdlab.training.run import resume as pick_up
 
-    path, step = _named(run, checkpoint)
+    path, step = named(run, checkpoint)
     if is_fit(path) and step is agent_steps is None:
         go_on(path)
         return
@@ -149,48 +133,6 @@ def resume(
         return pick_up(path, step, agent_steps=agent_steps, find=find_teacher, teacher=teacher)
 
     _carry_on(picked_up, longer=agent_steps is not None)
-
-
-def evaluate(
-    run: RunPath,
-    episodes: Annotated[
-        int | None,
-        typer.Option("--episodes", min=1, help="How many.", show_default="as configured"),
-    ] = None,
-    epsilon: Annotated[
-        float | None,
-        typer.Option(
-            "--epsilon",
-            min=0,
-            max=1,
-            help="Chance of a random action.",
-            show_default="as configured",
-        ),
-    ] = None,
-    seed: common.EpisodesSeed = 1000,
-    max_steps: Annotated[
-        int | None,
-        common.max_steps_option("the environment's limit, or else 1000 or four horizons"),
-    ] = None,
-    checkpoint: OfAgent = None,
-    modules: common.Import = None,
-    as_json: common.AsJson = False,
-    verbose: common.Verbose = False,
-) -> None:
-    """Play whole episodes with a run's agent, and say how well it does.
-
-    The score is the plain sum of the rewards that the environment pays.
-    """
-    path, step = _named(run, checkpoint)
-    _evaluate(
-        path,
-        as_json,
-        episodes=episodes,
-        epsilon=epsilon,
-        seed=seed,
-        step=step,
-        max_steps=max_steps,
-    )
 
 
 def _train(
@@ -208,7 +150,8 @@ def _train(
     from trdlab.training.setup import course_line, origin_line, plan, read_settings
 
     settings = read_settings(kind, env, preset_name, config, given, from_scratch=from_scratch)
-    origin = f"{origin_line(kind, env, preset_name, config)} {course_line(settings)}".strip()
+    course = "" if config else course_line(settings, preset_name, given)
+    origin = f"{origin_line(kind, env, preset_name, config)} {course}".strip()
     if dry_run:
         from trdlab.agents.teachers import find_teacher
         from trdlab.show.training import plan_page
@@ -268,18 +211,18 @@ def _carry_on(
     with stopping() as stop, open_run() as run:
         path, settings = run.folder.path, run.trainer.settings
         go_on = f"Go on: {run.folder.resume_command}"
-        _say(errors, f"Run: {path}")
+        common.say(errors, f"Run: {path}")
         if origin:
-            _say(errors, origin)
+            common.say(errors, origin)
         if run.trainer.lessons:
-            _say(errors, teacher_line(settings, run.trainer.lessons.levels))
+            common.say(errors, teacher_line(settings, run.trainer.lessons.levels))
         if longer:
-            _say(errors, longer_line(settings, run.trainer.agent_steps))
-        _say(errors, memory_line(run.memory, available_memory()))
+            common.say(errors, longer_line(settings, run.trainer.agent_steps))
+        common.say(errors, memory_line(run.memory, available_memory()))
         for line in updates_lines(settings):
-            _say(errors, line)
+            common.say(errors, line)
         if run.problem is not None:
-            _say(errors, f"{run.problem.cause} New episodes are begun in their place.")
+            common.say(errors, f"{run.problem.cause} New episodes are begun in their place.")
         with TrainingProgress(errors, settings.clock_end, run.trainer.clock) as progress:
             try:
                 done = carry_on(
@@ -292,76 +235,19 @@ def _carry_on(
                 raise type(error)(error.cause, f"{error.cure} {go_on}") from error
         steps, clock = run.trainer.agent_steps, run.trainer.clock
         if not done:
-            _say(errors, stopped_line(run.trainer.standing))
-            _say(errors, go_on)
+            common.say(errors, stopped_line(run.trainer.standing))
+            common.say(errors, go_on)
             raise typer.Exit(stop.code or 0)
-    _say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
+    common.say(errors, f"Trained {steps:,} agent steps in {duration(run.seconds)}.")
     best, episodes = best_step(run.folder), settings.checkpoint_episodes
     if line := best_line(path, clock, best, episodes=episodes):
-        _say(errors, line)
+        common.say(errors, line)
     if settings.evaluate_episodes:
-        result = _evaluate(path)
+        result = evaluated(path)
         if run.trainer.lessons:
             means = result.mean.value, result.interquartile_mean.value
-            _say(errors, reached_line(*means, run.trainer.lessons.levels))
+            common.say(errors, reached_line(*means, run.trainer.lessons.levels))
         else:
-            _compare_with_chance(run.folder, result, settings)
+            compare_with_chance(run.folder, result, settings)
     if settings.fit and own_fit(path, None) is None:
         fit_run(path)
-
-
-def _named(run: Path, checkpoint: int | None) -> tuple[Path, int | None]:
-    """Returns the folder of a run, and the step of the checkpoint that is named, if one is."""
-    from trdlab.errors import InputError
-    from trdlab.runs import find_checkpoint
-
-    path, step = find_checkpoint(str(run))
-    if step is not None and checkpoint is not None:
-        raise InputError(f"'{run}' names a checkpoint, as `checkpoint` does.", "Use one of them.")
-    return path, checkpoint if step is None else step
-
-
-def _evaluate(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
-    """Evaluates the agent of a run, prints the result, and says where it is kept."""
-    from trdlab.atari.names import find_game
-    from trdlab.cli.progress import EpisodeProgress
-    from trdlab.runs import RunFolder
-    from trdlab.show.training import acts, evaluation_page, human_line
-    from trdlab.training.loading import evaluate_run, run_settings
-
-    errors = common.errors()
-    with EpisodeProgress(errors) as progress:
-        result, kept = evaluate_run(path, **how, watch=progress.on_progress)
-    if as_json:
-        common.print_json(result.to_dict())
-    else:
-        settings = run_settings(RunFolder.open(path))
-        common.print_text(evaluation_page(result, how=acts(settings)))
-        mean = float(result.returns.mean())
-        if settings.kind == "atari" and (line := human_line(find_game(settings.env), mean)):
-            common.print_line(line)
-    _say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
-    return result
-
-
-def _compare_with_chance(
-    folder: "RunFolder", result: "Evaluation", settings: "TrainSettings"
-) -> None:
-    """Says so if an agent plays no better than random actions do."""
-    from trdlab.cli.progress import EpisodeProgress
-    from trdlab.show.training import chance_line
-    from trdlab.training.loading import evaluate_run
-
-    errors = common.errors()
-    with EpisodeProgress(errors) as progress:
-        chance, _ = evaluate_run(folder.path, epsilon=1.0, watch=progress.on_progress)
-    more = f"{folder.resume_command} --agent-steps {2 * settings.agent_steps}"
-    cure = f"Train longer: {more}; or try other settings"
-    if settings.epsilon_hold == 1:
-        cure += ", such as --epsilon-hold 10"
-    if line := chance_line(result, chance, f"{cure}."):
-        _say(errors, line)
-
-
-def _say(console: Console, text: str) -> None:
-    console.print(text, soft_wrap=True, markup=False)

@@ -90,13 +90,7 @@ class DecompositionNetwork(nn.Module):
         return components.sum(dim=-1) if logits is None else logits
 
     def with_outputs(self, num_actions: int, num_components: int, *, seed: int) -> Self:
-        """Returns a copy whose last layer is a new one, without a policy head.
-
-        Args:
-            num_actions: A of it.
-            num_components: N+1 of it.
-            seed: of its weights.
-        """
+        """Returns a copy whose last layer, `[F]` to `[A·(N+1)]`, is new; it has no policy head."""
         copy, rng = deepcopy(self), torch.Generator().manual_seed(seed)
         copy.head = linear(self.head.in_features, num_actions * num_components, rng)
         copy.num_actions, copy.num_components, copy.policy_head = num_actions, num_components, None

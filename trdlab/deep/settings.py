@@ -278,12 +278,7 @@ class TrainSettings:
         return (1.0 - part) * self.epsilon_start + part * self.epsilon_end
 
     def learning_rate_at(self, agent_steps: int, offline_updates: int | None = None) -> float:
-        """Returns Adam's learning rate; it falls over all updates, offline ones included.
-
-        Args:
-            agent_steps: taken so far.
-            offline_updates: made so far; by default all.
-        """
+        """Returns Adam's learning rate; by default all offline updates have been made."""
         if self.learning_rate_end is None:
             return self.learning_rate
         whole = 0 if self.teacher is None else self.offline_updates

@@ -13,7 +13,7 @@ from trdlab.environments.outcomes import INFO, LIFE_LOST
 from trdlab.errors import InputError, OutputError, TrdlabError
 from trdlab.estimator import Future
 from trdlab.runs import MetricsFile, RunFolder, checkpoint_steps, load_checkpoint, save_checkpoint
-from trdlab.runs.folder import check_free, is_fit, is_run
+from trdlab.runs.folder import check_free, is_fit
 from trdlab.time_axis import TimeAxis
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from trdlab.deep.fit import Fit
     from trdlab.deep.fit_settings import FitProgress, FitSettings, Layers
 
-_FITS = "fits"
 SAVE_SECONDS = 30.0
 """So often a fit is saved while it learns."""
 
@@ -175,19 +174,6 @@ def new_fit(path: Path, plan: Plan, interface: Interface, future: Future) -> Run
     """
     extra = {"fit": {"interface": interface.to_dict(), "future": future.to_dict()}}
     return RunFolder.create(path, plan.to_config(), extra)
-
-
-def fit_path(run: Path, step: int) -> Path:
-    """Returns the folder, in that of a run, for the fit of one of its checkpoints."""
-    return run / _FITS / f"{step:09d}"
-
-
-def run_of(fit: Path) -> tuple[Path, int] | None:
-    """Returns the run in whose folder a fit lies, and which checkpoint was fitted; or None."""
-    folder = fit.absolute().parent
-    if folder.name == _FITS and fit.name.isdecimal() and is_run(folder.parent):
-        return folder.parent, int(fit.name)
-    return None
 
 
 def is_done(folder: RunFolder) -> bool:

@@ -14,9 +14,10 @@ from trdlab.files import check_own, write_json
 from trdlab.rollouts.evaluation import Evaluation, score
 from trdlab.rollouts.playing import Watch, unwatched, usual_limit
 from trdlab.runs import RunFolder, best_step, checkpoint_steps, find_checkpoint, read_arrays
+from trdlab.runs.fits import fit_path, run_of
 from trdlab.runs.folder import is_fit
 from trdlab.runs.pretrained import is_shipped
-from trdlab.training.fitted import fit_path, is_done, load_fit, run_of
+from trdlab.training.fitted import is_done, load_fit
 from trdlab.training.machine import use_threads
 from trdlab.training.setup import future, make_environments
 

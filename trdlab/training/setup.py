@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from trdlab.training.teaching import FindTeacher
 
 _MEASURED_SECONDS = 3.0
-_SMALL = 10_000  # agent steps: below, a run is over soon
 
 
 def read_settings(
@@ -112,20 +111,29 @@ def origin_line(kind: Kind, env: str, preset_name: str | None, config: Path | No
     return preset_line(kind, env, preset_name or usual_preset(kind))
 
 
-def course_line(settings: TrainSettings) -> str:
-    """Returns what may be expected of a run that learns a game on a CPU; empty of all others.
+def course_line(settings: TrainSettings, preset_name: str | None, given: Mapping[str, Any]) -> str:
+    """Returns what may be expected of the preset `cpu` as it is; empty where more was told.
 
-    >>> course_line(TrainSettings("gym", "CartPole-v1"))
+    Args:
+        settings: of the run.
+        preset_name: of the preset; None for the usual one.
+        given: all that was told beside it.
+
+    >>> told = {"teacher": "a.pt"}
+    >>> course_line(preset("atari", "Pong").changed(told), "cpu", told)
+    'With a teacher it takes about twenty minutes on two cores.'
+    >>> course_line(preset("atari", "Pong", "paper"), "paper", {})
     ''
     """
-    if settings.kind != "atari" or settings.agent_steps < _SMALL or usual_preset("atari") != "cpu":
+    is_cpu = (preset_name or usual_preset(settings.kind)) == "cpu"
+    if not is_cpu or given.keys() - {"teacher", "seed"}:
         return ""
-    if settings.teacher is None:
-        return (
-            "From scratch a CPU takes hours for a million steps, and in these few games get far: "
-            "--teacher takes less."
-        )
-    return "With a teacher it takes about twenty minutes on two cores."
+    if settings.teacher is not None:
+        return "With a teacher it takes about twenty minutes on two cores."
+    return (
+        "From scratch a CPU takes hours for a million steps, and in these few games get far: "
+        "--teacher takes less."
+    )
 
 
 def _lines_of(config: Path) -> dict[str, Any]:

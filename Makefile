@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 
 demo: $(VENV)/installed
 	$(BIN)/trdlab gridworld --gamma 0.95 --N 2 --w 2
-	$(BIN)/trdlab explain pretrained:Breakout --step 200 --episodes 0
+	$(BIN)/trdlab explain pretrained:Breakout --step 200 --what forecast --episodes 0
 
 test: lint types imports unit docs
 

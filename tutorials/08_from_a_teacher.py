@@ -125,8 +125,13 @@ moment.plot()
 # The bars come in groups. The ball needs some thirty steps from the paddle to the bricks and back,
 # and while it is away nothing can be paid.
 #
-# How far this can be trusted stands in what training left behind. `trdlab explain
-# pretrained:Breakout --what calibration` plays more games, and tests it again; it takes a minute.
+# **Read "Tried out", too.** Both actions were really tried here, from copies of the game, and what
+# came was the same, though more was forecast of the other one. The agent does not take that action
+# here, so the fit has seldom seen it: only where it was forced. Believe what is said of the action
+# that the agent takes, and of the other one no more than a trial confirms.
+#
+# How far its forecasts can be trusted is on the page of the next section. To test them again, in
+# other games: `trdlab explain pretrained:Breakout --what calibration`.
 #
 # ## 5. Your own game
 #

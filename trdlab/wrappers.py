@@ -58,6 +58,17 @@ class TemporalRewardDecomposition(gym.Wrapper[Any, Any, Any, Any], RecordConstru
         self._components: FloatArray | None = None  # [A, N+1] at the last observation
         self._resetting = [layer for layer in layers(env) if isinstance(layer, Autoreset)]
 
+    @property
+    def components(self) -> FloatArray:
+        """`[A, N+1]`: what is expected at the last observation.
+
+        Raises:
+            TrdlabError: there is none yet.
+        """
+        if self._components is None:
+            raise TrdlabError("There is no observation yet.", "Call reset() before step().")
+        return self._components
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
@@ -67,7 +78,7 @@ class TemporalRewardDecomposition(gym.Wrapper[Any, Any, Any, Any], RecordConstru
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Steps, and decomposes the action taken and every action at the new observation."""
-        before = _looked_up(self._components)
+        before = self.components
         only_resets = any(layer.autoreset for layer in self._resetting)
         observation, reward, terminated, truncated, info = self.env.step(action)
         added = {ALL_ACTIONS: self._look_up(observation)}
@@ -108,10 +119,20 @@ class VectorTemporalRewardDecomposition(_VectorWrapper):
         self._actions = _discrete(env.single_action_space)
         self.estimator = _checked_estimator(estimator)
         # gymnasium 1.0 knows no modes: it always resets on the step after the end
-        mode = getattr(env.metadata.get("autoreset_mode"), "name", "NEXT_STEP")
-        self._next_step_resets = mode == "NEXT_STEP"
+        self._mode: str = getattr(env.metadata.get("autoreset_mode"), "name", "NEXT_STEP")
         self._components: FloatArray | None = None  # [num_envs, A, N+1] at the last observations
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+
+    @property
+    def components(self) -> FloatArray:
+        """`[num_envs, A, N+1]`: what is expected at the last observations.
+
+        Raises:
+            TrdlabError: there is none yet.
+        """
+        if self._components is None:
+            raise TrdlabError("There is no observation yet.", "Call reset() before step().")
+        return self._components
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -125,8 +146,8 @@ class VectorTemporalRewardDecomposition(_VectorWrapper):
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Steps, and decomposes the actions taken and every action at the new observations."""
-        before = _looked_up(self._components)
-        acted = ~self._ended if self._next_step_resets else np.ones_like(self._ended)
+        before = self.components
+        acted = ~self._ended if self._mode == "NEXT_STEP" else np.ones_like(self._ended)
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         chosen = np.zeros_like(before[:, 0])  # [num_envs, N+1]
         chosen[acted] = before[acted, np.asarray(actions)[acted] - self._actions.start]
@@ -176,10 +197,4 @@ def _decompose(
             f"environment has {actions.n} actions, so it should be {expected}.",
             "Use an estimator made for this environment.",
         )
-    return components
-
-
-def _looked_up(components: FloatArray | None) -> FloatArray:
-    if components is None:
-        raise TrdlabError("There is no observation yet.", "Call reset() before step().")
     return components

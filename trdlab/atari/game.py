@@ -1,5 +1,6 @@
 """One Atari game as a Gymnasium environment, prepared as the agents that trdlab trains see it."""
 
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -8,7 +9,7 @@ import numpy.typing as npt
 
 from trdlab.atari.names import find_game
 from trdlab.atari.vector import FRAMES_PER_SECOND, SIDE, STACK, action_names, make_vector
-from trdlab.errors import InputError, TrdlabError
+from trdlab.errors import InputError, TrdlabError, closest
 
 Frames = npt.NDArray[np.uint8]
 
@@ -26,15 +27,19 @@ class AtariGame(gym.Env[Frames, np.int64]):
         max_frames: of the emulator, after which an episode is truncated.
         frame_skip: for how many frames an action is held.
         full_action_space: all 18 actions, in place of those that the game knows.
+        render_mode: `rgb_array` for whole screens in colour, such as `(210, 160, 3)`: the game is
+            played twice then, in step.
 
     Raises:
-        InputError: there is no such game, or a value is out of its range.
+        InputError: there is no such game or render mode, or a value is out of its range.
 
     >>> env = AtariGame("Breakout")
     >>> observation, info = env.reset(seed=0)
     >>> observation.shape, info, env.action_names
     ((4, 84, 84), {'lives': 5}, ('NOOP', 'FIRE', 'RIGHT', 'LEFT'))
     """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": FRAMES_PER_SECOND / 4}  # noqa: RUF012
 
     def __init__(
         self,
@@ -45,20 +50,27 @@ class AtariGame(gym.Env[Frames, np.int64]):
         max_frames: int = 108_000,
         frame_skip: int = 4,
         full_action_space: bool = False,
+        render_mode: str | None = None,
     ) -> None:
-        self.game, self.frame_skip = find_game(game), frame_skip
-        self._envs = make_vector(
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            cure = closest(str(render_mode), self.metadata["render_modes"])
+            raise InputError(f"The render mode is '{render_mode}'.", cure)
+        self.game, self.frame_skip, self.render_mode = find_game(game), frame_skip, render_mode
+        made = partial(
+            make_vector,
             self.game,
             1,
-            stack=STACK,
             sticky=sticky,
             noop_max=noop_max,
             max_frames=max_frames,
             frame_skip=frame_skip,
             full_action_space=full_action_space,
         )
+        self._envs = made(stack=STACK)
+        self._shown = None if render_mode is None else made(stack=1, colour=True)
+        self._screen: Frames | None = None
         self.action_names = action_names(self._envs)
-        self.metadata = {"render_modes": [], "render_fps": FRAMES_PER_SECOND / frame_skip}
+        self.metadata = {**self.metadata, "render_fps": FRAMES_PER_SECOND / frame_skip}
         self.observation_space = gym.spaces.Box(0, 255, (STACK, SIDE, SIDE), np.uint8)
         self.action_space = gym.spaces.Discrete(len(self.action_names))
         self._begun = self._running = False
@@ -69,10 +81,12 @@ class AtariGame(gym.Env[Frames, np.int64]):
         """Begins a game; with a seed, all that follows is a function of it and of the actions."""
         super().reset(seed=seed)
         if seed is not None or not self._begun:  # a seeded reset costs 15 times as much
-            ale_seed = np.array([self.np_random.integers(2**31)])
-            observations, info = self._envs.reset(seed=ale_seed)
+            told: dict[str, Any] = {"seed": np.array([self.np_random.integers(2**31)])}
         else:
-            observations, info = self._envs.reset()
+            told = {}
+        observations, info = self._envs.reset(**told)
+        if self._shown is not None:
+            self._screen = self._shown.reset(**told)[0][0, 0]
         self._begun = self._running = True
         return observations[0], {"lives": int(info["lives"][0])}
 
@@ -90,6 +104,24 @@ class AtariGame(gym.Env[Frames, np.int64]):
             raise TrdlabError("No game is running.", "Call reset() first.")
         given = np.array([action], dtype=np.int64)
         observations, rewards, terminated, truncated, info = self._envs.step(given)
+        if self._shown is not None:
+            self._screen = self._shown.step(given)[0][0, 0]
         ends = bool(terminated[0]), bool(truncated[0])
         self._running = not any(ends)
         return observations[0], float(rewards[0]), *ends, {"lives": int(info["lives"][0])}
+
+    def render(self) -> Any:
+        """Returns the whole screen in colour, `[H, W, 3]`.
+
+        Raises:
+            TrdlabError: there is nothing to show before the first reset.
+        """
+        if self.render_mode is None:
+            gym.logger.warn(
+                "render() has nothing to return without a render mode. "
+                'Make the environment with render_mode="rgb_array".'
+            )
+            return None
+        if self._screen is None:
+            raise TrdlabError("There is no episode yet.", "Call reset() first.")
+        return self._screen.copy()

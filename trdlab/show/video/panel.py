@@ -12,13 +12,15 @@ import numpy as np
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.formatting import decimals_for, plain
 from trdlab.show.plots import style
-from trdlab.show.plots.bars import scale_of
 from trdlab.show.video.canvas import Frame, Sheet, even, line_of, shortened, width_of
 from trdlab.time_axis import TimeAxis
 
 _PITCH = 7  # pixels from a bar to the next, where there is room
 _LEAST_PITCH, _MOST_PITCH = 2, 48
-_LEAST_WIDTH, _MOST_WIDTH = 300, 700  # of all bars, where that can be
+_MOST_WIDTH = 700  # pixels of all bars, where that can be
+_LETTERS = 24  # times the size of letters: how wide a panel is at least
+_MATTERS = 0.01  # of the residual: explicit components that add up to less do not set the scale
+_ROOM = 1.5  # times the largest explicit component: of a larger residual no more is seen
 _HATCH = 3  # pixels between the lines of the residual
 _NEWS = 10  # frames for which it is told that the scale has changed
 _PALE = 0.35  # of its colour is left to a bar that is not to be trusted
@@ -37,9 +39,12 @@ class Span(NamedTuple):
     news: int = 0
 
     def over(self, rows: FloatArray) -> "Span":
-        """Returns what also shows more rows `[R, N+1]` of bars; their residuals may leave it."""
-        wanted = scale_of(rows) if rows.size else None
-        low, high = (0.0, 0.0) if wanted is None else wanted
+        """Returns what also shows more rows `[R, N+1]` of bars; a large residual is cut off."""
+        sizes = np.abs(rows)
+        matters = sizes[:, :-1].sum(axis=1).max() > _MATTERS * sizes[:, -1].max()
+        room = _ROOM * float(sizes[:, :-1].max(initial=0.0)) if matters else np.inf
+        bars = np.clip(rows, -room, room)
+        low, high = min(0.0, float(bars.min())), max(0.0, float(bars.max()))
         if self.low <= low and high <= self.high:
             return self._replace(news=max(0, self.news - 1))
         is_first = self.low == self.high
@@ -95,7 +100,7 @@ class Panel:
     def pitch(self) -> int:
         """The pixels from one bar to the next."""
         places = self.axis.num_components + 1  # the residual is apart
-        room = (_LEAST_WIDTH - self.left - self.size) // places
+        room = (_LETTERS * self.size - self.left - self.size) // places
         return min(_MOST_PITCH, max(room, min(_PITCH, max(_LEAST_PITCH, _MOST_WIDTH // places))))
 
     @property
@@ -185,7 +190,10 @@ class Panel:
             is_residual = i == self.axis.horizon
             _bar(sheet, (left, top, right, bottom), colour, hatched=is_residual)
             if height != row.components[i]:
+                value = float(row.components[i])
                 _arrow(sheet, (left + right) / 2, end, up=height > 0.0, size=self.size // 3)
+                text = style.told(value, decimals_for([value]))
+                sheet.write(left - self.size // 2, end, text, at="ra" if value > 0.0 else "rd")
         if row.lit is not None:
             left, right = self.place(row.lit)
             ends = self.top(at) - 2, self.top(at) + self.bars_height + 1

@@ -1,6 +1,6 @@
 """The agent that is explained: an estimator, the policy it describes, and where it acts."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,6 +11,7 @@ import numpy as np
 from trdlab.agents.models import World
 from trdlab.agents.places import Origin, look
 from trdlab.decomposition import RewardDecomposition
+from trdlab.environments import Environments
 from trdlab.environments.batches import Make, in_batches
 from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
@@ -67,14 +68,18 @@ class Agent:
         return replace(look(self.make), action_names=self.action_names)
 
     @contextmanager
-    def begin(self, *, seed: int, **how: Any) -> Iterator[Recording]:
+    def begin(
+        self, *, seed: int, film: Callable[[Environments], Environments] | None = None, **how: Any
+    ) -> Iterator[Recording]:
         """Begins an episode of the agent, to be played and paused as one likes.
 
         Args:
             seed: of the environment, and of the actions.
+            film: is given the environment, and returns it such that it is looked at (`Filmed`).
             how: as for `Recording`.
         """
-        with closing(self.make(1, seed)) as environments:
+        made = self.make(1, seed)
+        with closing(made if film is None else film(made)) as environments:
             yield Recording(self.estimator, environments, policy=self.policy, seed=seed, **how)
 
     def play(

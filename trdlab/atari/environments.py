@@ -96,6 +96,7 @@ class AtariEnvironments:
         self._options = {**options, **views}
         told = {name: on for name, on in views.items() if on}  # those of older runs have neither
         settings = {"game": self.game, **options, **told}
+        self._seed = seed
         self._histories = Histories(
             settings, num_envs=num_envs, seed=seed, reseed_after=RESEED_AFTER
         )
@@ -194,6 +195,15 @@ class AtariEnvironments:
                     "Judge it without copies of its states.",
                 )
         return copies
+
+    def screened(self) -> Any:
+        """Returns others that do the same, have not begun, and show whole `screens` in colour."""
+        from trdlab.atari.views import GreyAndColour
+
+        if self.colour:  # these show nothing else
+            return self
+        options = {name: of for name, of in self._options.items() if name != "colour"}
+        return GreyAndColour(self.game, self.num_envs, seed=self._seed, **options)
 
     @property
     def has_lives(self) -> bool:

@@ -72,6 +72,7 @@ class GymEnvironments:
         env_arguments: Mapping[str, Any] | None = None,
     ) -> None:
         self._source, self.num_envs = Source(env, env_arguments), num_envs
+        self.given = env, seed, dict(env_arguments or {})
         self._envs = self._source.make(num_envs)
         self.name = self._source.name
         settings = {"env_id": self.name, "arguments": dict(env_arguments or {})}
@@ -164,8 +165,8 @@ class GymEnvironments:
             if self._proof.fault:
                 again = zip(chosen, self._played_again(chosen, self._proof.fault), strict=True)
                 found = [(twin, own_chance(twin, held[env])) for env, twin in again]
-            words = np.random.SeedSequence(seed).spawn(len(chosen))
-            for (_, chance), own in zip(found, words, strict=True):
+            chances = np.random.SeedSequence(seed).spawn(len(chosen))
+            for (_, chance), own in zip(found, chances, strict=True):
                 renew(chance, own)
         copies = self._with([twin for twin, _ in found], seed)
         copies.shared_chance = self._proof.shared_chance
@@ -178,6 +179,13 @@ class GymEnvironments:
         for env in self._envs:
             self._source.close(env)
 
+    def screened(self) -> "GymEnvironments":
+        """Returns others that do the same and are drawn, and closes these, which have not begun."""
+        from trdlab.environments.screens import drawn_as
+
+        self.close()
+        return drawn_as(self.given, self.num_envs, getattr(self._envs[0], "metadata", None))
+
     def _look_at(self, env: Any) -> None:
         """Notes what can be seen and done in an environment."""
         self._actions = Actions.of(env.action_space, self.name)
@@ -187,10 +195,9 @@ class GymEnvironments:
         self.observation_space = frame_space(self._space, self.name)
         whole = getattr(self.observation_space, "whole", None)
         self._channels_last = whole is None and self.observation_space.shape != self._space.shape
-        as_it_is = whole is None and not self._channels_last
-        self._plain_shape = self._space.shape if as_it_is else None
-        grey = is_image(self._space) and len(self._space.shape or ()) == 2
-        self.stack = 1 if grey else None
+        is_plain = whole is None and not self._channels_last
+        self._plain_shape = self._space.shape if is_plain else None
+        self.stack = 1 if is_image(self._space) and len(self._space.shape or ()) == 2 else None
         spec, metadata = getattr(env, "spec", None), getattr(env, "metadata", None)
         self.time_limit: int | None = spec.max_episode_steps if spec else None
         self.frames_per_second: float | None = (metadata or {}).get("render_fps")
@@ -237,8 +244,8 @@ class GymEnvironments:
         return envs
 
     def _not_copyable(self, why: str) -> NotCopyable:
-        cure = "Judge it without copies of its states."
-        return NotCopyable(f"{self.name} cannot be copied: {why}", cure)
+        why = f"{self.name} cannot be copied: {why}"
+        return NotCopyable(why, "Judge it without copies of its states.")
 
     def _with(self, envs: list[Env], seed: int) -> Self:
         """Returns the same with copies for environments, whose past is not known."""

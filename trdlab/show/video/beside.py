@@ -16,7 +16,7 @@ from trdlab.show.video.canvas import (
     letters_for,
     zoom_for,
 )
-from trdlab.show.video.panel import Panel, Span, best
+from trdlab.show.video.panel import ABOUT, Panel, Span, best
 from trdlab.time_axis import TimeAxis
 
 _GUESS = 400  # pixels: how wide a panel is, as far as the size of its letters is concerned
@@ -119,9 +119,16 @@ class Beside:
         return " · ".join([*parts, *["over"] * told.over])
 
 
-def panel_for(axis: TimeAxis, names: tuple[str, ...], height: int, size: int, rows: int) -> Panel:
+def panel_for(
+    axis: TimeAxis,
+    names: tuple[str, ...],
+    height: int,
+    size: int,
+    rows: int,
+    about: str = ABOUT,
+) -> Panel:
     """Returns a panel as high as it has to be, and no lower than so many pixels."""
-    return Panel(axis, names, max(even(height), least_height(size, rows)), size, rows)
+    return Panel(axis, names, max(even(height), least_height(size, rows)), size, rows, about)
 
 
 def least_height(size: int, rows: int) -> int:

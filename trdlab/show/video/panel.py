@@ -20,12 +20,12 @@ _LEAST_PITCH, _MOST_PITCH = 2, 48
 _MOST_WIDTH = 700  # pixels of all bars, where that can be
 _LETTERS = 24  # times the size of letters: how wide a panel is at least
 _MATTERS = 0.01  # of the residual: explicit components that add up to less do not set the scale
-_ROOM = 1.5  # times the largest explicit component: of a larger residual no more is seen
+_ROOM = 1.25  # times the largest explicit component: of a larger residual no more is seen
 _HATCH = 3  # pixels between the lines of the residual
 _NEWS = 10  # frames for which it is told that the scale has changed
 _PALE = 0.35  # of its colour is left to a bar that is not to be trusted
-_ABOUT = "expected discounted reward; t: now"
-_NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
+ABOUT = "expected discounted reward; t: now"
+_NICE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
 class Span(NamedTuple):
@@ -88,6 +88,7 @@ class Panel:
         height: in pixels.
         size: of its letters, in pixels.
         rows: how many actions it has room for.
+        about: what the bars are, in a line below them.
     """
 
     axis: TimeAxis
@@ -95,6 +96,7 @@ class Panel:
     height: int
     size: int
     rows: int = 2
+    about: str = ABOUT
 
     @property
     def pitch(self) -> int:
@@ -112,7 +114,8 @@ class Panel:
     def width(self) -> int:
         """In pixels."""
         bars = self.left + (self.axis.num_components + 1) * self.pitch
-        return even(bars + max(self.size, width_of(self.axis.label(self.axis.horizon), self.size)))
+        most = bars + width_of(self.labels[-1][1], self.size) // 2 + self.size // 2
+        return even(max(_LETTERS * self.size, most))
 
     @property
     def bars_height(self) -> int:
@@ -213,7 +216,7 @@ def _ground(panel: Panel, span: Span) -> Sheet:
         middle = sum(panel.place(component)) / 2
         sheet.draw.line((middle, foot - 3, middle, foot), style.MUTED)
         sheet.write(middle, foot, label, style.MUTED, at="ma")
-    about = shortened(_ABOUT, panel.width - panel.size, panel.size)
+    about = shortened(panel.about, panel.width - panel.size, panel.size)
     sheet.write(panel.size // 2, foot + line, about, style.MUTED)
     return sheet
 

@@ -48,7 +48,7 @@ class ForecastRendering(TemporalRewardDecomposition):
     >>> env = ForecastRendering(env, exact(env.mdp, TimeAxis(0.95, horizon=4)))
     >>> _ = env.reset(seed=0)
     >>> env.render().shape
-    (384, 1174, 3)
+    (384, 1192, 3)
     """
 
     def __init__(

@@ -15,7 +15,7 @@ from trdlab.wrappers import TemporalRewardDecomposition
 
 def test_it_keeps_gymnasiums_contract():
     env = AtariGame("Breakout", sticky=0.25)
-    check_env(env, skip_render_check=True)  # it has no render modes
+    check_env(env, skip_render_check=True)  # made without a render mode
     assert env.observation_space == gym.spaces.Box(0, 255, (4, 84, 84), np.uint8)
     assert env.metadata["render_fps"] == 15
 
@@ -79,3 +79,22 @@ def test_misuse_is_refused():
     assert [env.step(0)[3] for _ in range(2)] == [False, True]
     with pytest.raises(TrdlabError, match="No game is running"):
         env.step(0)
+
+
+def test_a_drawn_game_is_the_same_game_and_shows_the_whole_screen():
+    plain, drawn = AtariGame("Pong"), AtariGame("Pong", render_mode="rgb_array")
+    with pytest.raises(TrdlabError, match=r"Call reset\(\) first"):
+        drawn.render()
+    np.testing.assert_array_equal(plain.reset(seed=3)[0], drawn.reset(seed=3)[0])
+    before = drawn.render()
+    assert (before.shape, before.dtype) == ((210, 160, 3), np.uint8)
+    for action in (2, 2, 3, 3, 0) * 4:
+        one, other = plain.step(action), drawn.step(action)
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1:] == other[1:]
+    assert (drawn.render() != before).any()
+
+
+def test_a_game_draws_nothing_else():
+    with pytest.raises(InputError, match=r"The render mode is 'human'"):
+        AtariGame("Pong", render_mode="human")

@@ -13,6 +13,7 @@ COMMANDS = {
     "gridworld": "trdlab.cli.gridworld",
     "tabular": "trdlab.cli.tabular",
     "explain": "trdlab.cli.explain",
+    "video": "trdlab.cli.video",
     "compare": "trdlab.cli.compare",
     "agent": "trdlab.cli.agent",
     "fit": "trdlab.cli.fit",

@@ -105,6 +105,31 @@ class TrainingProgress(Bar):
         return f", {(done - self._first) / passed:,.0f}/s" if passed > 1.0 else ""
 
 
+class VideoProgress(Bar):
+    """Shows how many frames of a video are done.
+
+    Args:
+        console: where to; a bar if it is a terminal, otherwise a line now and then.
+    """
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(
+            console,
+            TextColumn("{task.description}", markup=False),
+            BarColumn(bar_width=None),
+            TimeRemainingColumn(compact=True),
+            description="Drawing",
+            total=None,
+        )
+        self._shown = time.monotonic()  # most are done before there is a line to print
+
+    def on_frame(self, done: int, count: int) -> None:
+        """Shows how far it is, if it is time to."""
+        if self.is_due():
+            line = f"{done:,} of {count:,} frames drawn"
+            self.show(line, description=line, completed=done, total=count)
+
+
 class EpisodeProgress:
     """Shows how far episodes are that are played.
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib import import_module
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -108,6 +110,21 @@ class Explanation(Printable):
         ]
         wanted = [name for part in self.parts or PARTS for name in _OF_PART[part]]
         return tuple(part for part in told if part and part.name in (*wanted, "missing"))
+
+    def to_video(self, path: str | Path, what: str = "episode", **how: Any) -> Path:
+        """Writes its episode as a video, and returns the path.
+
+        Args:
+            path: `.mp4` (with the extra `video`), `.webp` or `.gif`.
+            what: `episode`, `saliency` or `components`.
+            how: else, as for `trdlab.show.video.films.save_video`.
+
+        Raises:
+            InputError: the episode was not asked for, or there is nothing to see of it.
+            OutputError: the file exists, or cannot be written.
+        """
+        found: Path = import_module("trdlab.show.video.films").save_video(self, path, what, **how)
+        return found
 
 
 def parse_parts(text: str | None) -> tuple[Part, ...]:

@@ -57,7 +57,7 @@ class Filmed:
         return step
 
     def _look(self, screens: Frames | None, frames: Frames) -> None:
-        picture = screens[0] if screens is not None else _as_picture(frames[0])
+        picture = screens[0] if screens is not None else as_picture(frames[0])
         if picture is not None:
             self.pictures.append(self._keep(picture))
 
@@ -73,7 +73,7 @@ def _paid(info: Mapping[str, Any]) -> tuple[str, ...]:
         return ()
 
 
-def _as_picture(frame: Any) -> Frames | None:
+def as_picture(frame: Any) -> Frames | None:
     """Returns an observed frame as a picture `[H, W, 3]`; None where it is none."""
     seen = np.asarray(frame)
     if seen.dtype != np.uint8 or seen.ndim not in (2, 3) or min(seen.shape[-2:]) < 8:

@@ -60,6 +60,16 @@ def even(size: int) -> int:
     return size + size % 2
 
 
+def evened(frame: Frame) -> Frame:
+    """Returns a frame with even sides, the last row or column twice where it was odd.
+
+    >>> evened(np.zeros((3, 4, 3), dtype=np.uint8)).shape
+    (4, 4, 3)
+    """
+    height, width, _ = frame.shape
+    return np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+
+
 def checked_frame(frame: object) -> Frame:
     """Returns a frame.
 

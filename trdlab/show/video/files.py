@@ -13,7 +13,7 @@ from trdlab.files import check_output, write_whole
 from trdlab.show.video.canvas import Frame
 
 SUFFIXES = (".mp4", ".webp", ".gif")
-_QUALITY = 8  # of 10, for mp4
+_QUALITY = 8  # of 10
 _COLOURS = 256  # of a frame of a GIF
 
 
@@ -64,7 +64,7 @@ def _mp4(path: Path, frames: Iterator[Frame], count: int, rate: float) -> None:
 
 
 def _webp(path: Path, frames: Iterator[Frame], count: int, rate: float) -> None:
-    how = {"lossless": True, "quality": 0, "method": 0, "minimize_size": False}
+    how = {"quality": _QUALITY * 10 + 10, "method": 0}
     _Reel(frames, count).save(
         path, "WEBP", save_all=True, duration=_lengths(count, rate, 1000), loop=0, **how
     )

@@ -12,7 +12,7 @@ from trdlab.environments.stack import FrameStack
 from trdlab.errors import InputError
 from trdlab.gridworld import Gridworld
 from trdlab.rollouts.episodes import Episode
-from trdlab.rollouts.film import Filmed
+from trdlab.rollouts.film import Filmed, as_picture
 from trdlab.show.video.canvas import Frame, text_frame
 
 _HEIGHT, _LEAST_CELL = 300, 40  # pixels: how high a map is about, and how wide a cell is at least
@@ -24,10 +24,26 @@ class Sight(NamedTuple):
     Args:
         picture: `[H, W, 3]`, as people see it.
         observation: `[...]`, as the estimator is asked about it.
+        is_whole: whether the picture shows just what the observation shows, from corner to corner.
     """
 
     picture: Frame
     observation: Any
+    is_whole: bool = False
+
+    @property
+    def seen(self) -> Frame:
+        """`[H, W, 3]`: a picture of just what the agent sees.
+
+        Raises:
+            InputError: it sees no picture.
+        """
+        found = self.picture if self.is_whole else as_picture(self.observation)
+        if found is None:
+            raise InputError(
+                "The agent sees no picture.", "Ask for one of an agent that sees images."
+            )
+        return found
 
 
 def sights(agent: Agent, episode: Episode, seed: int) -> Iterator[Sight]:
@@ -75,7 +91,8 @@ def _played_again(agent: Agent, episode: Episode, seed: int) -> Iterator[Sight]:
                 "There is nothing to see of the environment: it draws no frames.",
                 'Make it with render_mode="rgb_array", and install what it draws with.',
             )
-        yield Sight(latest[0], stack.observations[0])
+        is_whole = getattr(environments, "game", None) is not None  # Atari games are seen whole
+        yield Sight(latest[0], stack.observations[0].copy(), is_whole)
         for at, (action, before) in enumerate(zip(episode.actions, episode.rewards, strict=True)):
             step = environments.step(np.array([action]))
             (reward,) = agent.estimator.future.count(step.rewards)
@@ -86,4 +103,4 @@ def _played_again(agent: Agent, episode: Episode, seed: int) -> Iterator[Sight]:
                     "Only what does the same again can be drawn.",
                 )
             stack.push(step.frames)
-            yield Sight(latest[0], stack.observations[0].copy())
+            yield Sight(latest[0], stack.observations[0].copy(), is_whole)

@@ -3,13 +3,17 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import product
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Any, Literal, Protocol, Self, get_args, runtime_checkable
 
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
+
+MapMethod = Literal["gradcam", "hirescam"]
+"""How maps of where a network looks are made: as in the paper, or by the gradient at each place."""
+MAP_METHODS: tuple[MapMethod, ...] = get_args(MapMethod)
 
 
 @dataclass(frozen=True)

@@ -295,3 +295,17 @@ def test_what_is_interrupted_leaves_nothing(explain, tmp_path, monkeypatch):
     code, out, _ = explain("gridworld:ledge,slip=0.2")
     assert (code, out) == (130, "")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_matters_for_near_and_far(explain, tmp_path):
+    how = ("--what", "saliency", "--component", "0,later", "--episodes", 0)
+    code, out, _ = explain("gridworld:drone", *how, "--out", "pictures")
+    assert code == 0
+    assert "What it expects after the first 4 steps hangs most on row" in out
+    assert out.count("adds to") == 2
+    assert (tmp_path / "pictures" / "saliency-seed-0-step-0.png").exists()
+    data = json.loads(explain("gridworld:drone", *how, "--json")[1])
+    assert data["saliency"]["entries"]["method"] == "exchange"
+    assert data["moment"] is None
+    code, _, err = explain("gridworld:drone", "--what", "saliency", "--component", 9)
+    assert (code, err) == (2, "error: There are no components '9'. They run from 0 to 4.\n")

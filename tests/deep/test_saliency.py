@@ -50,13 +50,11 @@ def of_channels() -> NetworkEstimator:
     return upon(trunk, NetworkEstimator(top, AXIS, FUTURE, channels=channels))
 
 
-def test_by_hand():
-    """One convolution of kernel 1 makes two maps, x and 3 − x; the head sees all of their places.
+def two_maps() -> NetworkEstimator:
+    """A convolution of kernel 1, which makes the maps x and 3 − x, and a head that sees all of it.
 
-    On [[1, 2], [0, 4]] the ReLU leaves A₀ = [[1, 2], [0, 4]] and A₁ = [[2, 1], [3, 0]]. The head of
-    component 0 weighs the places of A₀ by 1, 2, 3, 4 and those of A₁ by −1: α = 10/4 and −1.
-    Component 1 reads the last place of A₁ alone, where the ReLU is shut: GradCAM of the maps
-    after it gives α = 0 and 2/4.
+    The head of component 0 weighs the four places of the first one by 1, 2, 3, 4 and those of the
+    second by −1; component 1 reads the last place of the second alone, twice.
     """
     network = Small(nn.Conv2d(1, 2, 1), nn.ReLU(), features=8, components=2, shape=(1, 2, 2))
     with torch.no_grad():
@@ -65,8 +63,15 @@ def test_by_hand():
         network.head.weight.copy_(
             torch.tensor([[1.0, 2, 3, 4, -1, -1, -1, -1], [0, 0, 0, 0, 0, 0, 0, 2]])
         )
-    estimator = NetworkEstimator(network, TimeAxis(0.9, 1), FUTURE)
-    (maps,) = estimator.saliency(np.array([[[[1, 2], [0, 4]]]]), [0])
+    return NetworkEstimator(network, TimeAxis(0.9, 1), FUTURE)
+
+
+def test_by_hand():
+    """On [[1, 2], [0, 4]] the ReLU leaves A₀ = [[1, 2], [0, 4]] and A₁ = [[2, 1], [3, 0]].
+
+    The means of the weights are α = 10/4 and −1, and of component 1 they are 0 and 2/4.
+    """
+    (maps,) = two_maps().saliency(np.array([[[[1, 2], [0, 4]]]]), [0])
     np.testing.assert_allclose(maps[0], [[2.5 - 2, 5 - 1], [-3, 10]])
     np.testing.assert_allclose(maps[1], [[1, 0.5], [1.5, 0]])
 
@@ -95,6 +100,22 @@ def test_whatever_follows_the_layer_the_weights_are_mean_gradients(following):
         expected = (slopes.mean(dim=(2, 3), keepdim=True) * maps).sum(dim=1).detach()
         found = gradcam(network, inputs, lambda outputs: outputs[:, 0])[:, k]
         torch.testing.assert_close(found, expected)
+
+
+def test_at_each_place_by_hand():
+    """Of the network above the head weighs each place: HiResCAM is what that place adds to y.
+
+    Component 0: 1·1 − 2, 2·2 − 1, 3·0 − 3, 4·4 − 0; all places together make y without its bias.
+    """
+    estimator = two_maps()
+    seen = np.array([[[[1, 2], [0, 4]]]])
+    (maps,) = estimator.saliency(seen, [0], method="hirescam")
+    np.testing.assert_allclose(maps, [[[-1, 3], [-3, 16]], [[0, 0], [0, 0]]])
+    told = estimator.decompose(seen).components[0, 0]
+    bias = estimator.network.head.bias.detach().numpy()
+    np.testing.assert_allclose(maps.sum(axis=(1, 2)), told - bias, rtol=1e-6)
+    with pytest.raises(InputError, match=r"no maps 'gradcan'. Did you mean 'gradcam'"):
+        estimator.saliency(seen, [0], method="gradcan")
 
 
 @pytest.mark.parametrize("make", [lambda: estimator_for(ATARI), of_channels])
@@ -156,7 +177,7 @@ def test_layers_and_actions_that_do_not_exist():
         estimator.saliency(seen, [0, 3])
     with pytest.raises(InputError, match=r"for 2 observations"):
         estimator.saliency(seen, [0])
-    with pytest.raises(InputError, match=r"no convolutions.*`attributions`"):
+    with pytest.raises(InputError, match=r"no convolutions.*attributions"):
         estimator_for(CART).saliency(np.zeros((1, 4), np.float32), [0])
 
 
@@ -202,9 +223,9 @@ def test_an_entry_that_is_as_in_the_baseline_adds_nothing():
 
 
 def test_images_and_states_have_no_attributions():
-    with pytest.raises(InputError, match=r"reads images.*`saliency`"):
+    with pytest.raises(InputError, match=r"reads images.*saliency"):
         estimator_for(ATARI).attributions(images(1), [0], baseline=images(1)[0])
-    with pytest.raises(InputError, match=r"reads states.*`decompose`"):
+    with pytest.raises(InputError, match=r"reads states.*decomposition"):
         estimator_for(gym.spaces.Discrete(5)).attributions(np.array([1]), [0], baseline=0)
 
 

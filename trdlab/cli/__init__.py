@@ -8,7 +8,13 @@ from typing import Any
 
 from trdlab.errors import NotImported, TrdlabError
 
-_OPTIONS = {"horizon": "--N", "width": "--w", "parts": "--what", "env_arguments": "--env-arg"}
+_OPTIONS = {
+    "horizon": "--N",
+    "width": "--w",
+    "parts": "--what",
+    "components": "--component",
+    "env_arguments": "--env-arg",
+}
 """Of arguments that are called otherwise on the command line."""
 
 

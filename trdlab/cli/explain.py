@@ -1,7 +1,7 @@
 """`trdlab explain`: what an agent expects, and how far that can be trusted."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -18,7 +18,7 @@ def explain(
         typer.Option(
             "--what",
             metavar="PART,...",
-            help="forecast, contrast, episode, calibration.",
+            help="forecast, contrast, episode, calibration, saliency.",
             show_default="what matters most",
         ),
     ] = None,
@@ -39,6 +39,22 @@ def explain(
             show_default="the next best",
         ),
     ] = None,
+    components: Annotated[
+        str | None,
+        typer.Option(
+            "--component",
+            metavar="K|A-B,...",
+            help="Of saliency: of which, two against each other, later, or all.",
+            show_default="near and far",
+        ),
+    ] = None,
+    layer: Annotated[
+        int, typer.Option("--layer", min=0, help="Of saliency: of which convolution.")
+    ] = 0,
+    maps: Annotated[
+        Literal["gradcam", "hirescam"],
+        typer.Option("--maps", help="Of saliency: how they are made."),
+    ] = "gradcam",
     env: common.Env = None,
     env_arguments: common.EnvArguments = None,
     action_names: common.ActionNames = None,
@@ -112,6 +128,9 @@ def explain(
             foil=foil,
             episodes=episodes,
             max_steps=max_steps,
+            components=components,
+            layer=layer,
+            maps=maps,
             watch=progress.on_progress,
         )
     if as_json:

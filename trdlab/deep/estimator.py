@@ -14,9 +14,9 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.deep.channels import Channels, outlook_of, reward_of, within
 from trdlab.deep.loss import acted
 from trdlab.deep.networks import DecompositionNetwork
-from trdlab.deep.saliency import gradcam, integrated_gradients, redrawn
-from trdlab.errors import InputError
-from trdlab.estimator import Future, Outlook
+from trdlab.deep.saliency import gradcam, hirescam, integrated_gradients, redrawn
+from trdlab.errors import InputError, closest
+from trdlab.estimator import MAP_METHODS, Future, MapMethod, Outlook
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,27 +92,34 @@ class NetworkEstimator:
         return self._asked(lambda seen: network.body(network.preprocess(seen)), observations)
 
     @torch.inference_mode(mode=False)
-    def saliency(self, observations: Any, actions: Any, *, layer: int = 0) -> FloatArray:
-        """Returns where in images each component is decided: GradCAM maps `[B, N+1, h, w]`, signed.
+    def saliency(
+        self, observations: Any, actions: Any, *, layer: int = 0, method: MapMethod = "gradcam"
+    ) -> FloatArray:
+        """Returns where in images each component is decided: maps `[B, N+1, h, w]`, signed.
 
         The map of a component is the sum of the layer's activation maps, each times the mean of the
-        component's gradient over it (see `trdlab.deep.saliency.gradcam`). It is of the expected
-        reward, before that is cut to what is `possible`.
+        component's gradient over it (see `trdlab.deep.saliency.gradcam`), or else times its
+        gradient at each place (see `hirescam` there). It is of the expected reward, before that is
+        cut to what is `possible`.
 
         Args:
             observations: `[B, ...]`.
             actions: `[B]`, the number of the action that each is asked about.
             layer: which convolution, from 0.
+            method: `gradcam`, as in the paper, or `hirescam`.
 
         Raises:
-            InputError: the network has no such convolution, there are not B actions, one does not
-                exist, or as for `decompose`.
+            InputError: there is no such convolution or method, there are not B actions, there is no
+                such action, or as for `decompose`.
         """
         seen, chosen = self._given(observations), self._chosen(actions, len(observations))
         each = max(1, self.batch_size // self.time_axis.num_components)
         inputs = (self.network.preprocess(of.to(self.device)) for of in torch.split(seen, each))
+        if method not in MAP_METHODS:
+            raise InputError(f"There are no maps '{method}'.", closest(method, MAP_METHODS))
+        make = gradcam if method == "gradcam" else hirescam
         parts = [
-            gradcam(self.network, of, partial(self._row, rows), layer).cpu()
+            make(self.network, of, partial(self._row, rows), layer).cpu()
             for of, rows in zip(inputs, torch.split(chosen, each), strict=True)
         ]
         maps: FloatArray = torch.cat(parts).numpy()
@@ -139,9 +146,10 @@ class NetworkEstimator:
         preprocess = self.network.preprocess
         inputs = preprocess(seen.to(self.device))  # [B, F]
         if inputs.ndim != 2 or seen.ndim == 1:
-            whole, cure = ("images", "`saliency`") if seen.ndim > 2 else ("states", "`decompose`")
+            whole, cure = ("images", "saliency") if seen.ndim > 2 else ("states", "decomposition")
             raise InputError(
-                f"The network reads {whole}, which have no entries of their own.", f"Use {cure}."
+                f"The network reads {whole}, which have no entries of their own.",
+                f"Ask for their {cure}.",
             )
         held = preprocess(self._given(np.asarray(baseline)[None]).to(self.device))[0]  # [F]
         found = np.zeros((len(inputs), self.time_axis.num_components, held.numel()), np.float32)

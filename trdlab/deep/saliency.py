@@ -50,7 +50,7 @@ def split(network: DecompositionNetwork, layer: int) -> Parts:
     if not ends:
         raise InputError(
             "The network has no convolutions, so it has no maps of where it looks.",
-            "It reads a vector: ask which entries matter, with `attributions`.",
+            "It reads a vector: ask its attributions, which entries matter.",
         )
     if not 0 <= layer < len(ends):
         raise InputError(
@@ -92,6 +92,33 @@ def gradcam(network: DecompositionNetwork, inputs: Tensor, tell: Tell, layer: in
         slopes = _slopes(told, lift)  # [N+1, B, C]
         weights = slopes / math.prod(maps.shape[2:])  # [N+1, B, C], the means
         return torch.einsum("kbc,bchw->bkhw", weights, maps)
+
+
+def hirescam(network: DecompositionNetwork, inputs: Tensor, tell: Tell, layer: int = 0) -> Tensor:
+    """Returns the HiResCAM map of each component: `[B, N+1, h, w]`, signed.
+
+    It is `Σ_c ∂y_k / ∂A_c ⊙ A_c`, place by place, with A_c as for `gradcam`: a place counts by the
+    gradient there and not by the mean over all places, which says nothing of where it came from.
+
+    Args:
+        network: with convolutions.
+        inputs: `[B, ...]`, preprocessed.
+        tell: what y is.
+        layer: which convolution, from 0.
+
+    Raises:
+        InputError: the network has no such convolution.
+
+    Source: Draelos and Carin (2020).
+    """
+    below, above = split(network, layer)
+    with _asked(network):
+        with torch.no_grad():
+            maps = below(inputs)  # [B, C, h, w]
+        maps.requires_grad_()
+        told = tell(network.by_action(_through(above, maps)))  # [B, N+1]
+        slopes = _slopes(told, maps)  # [N+1, B, C, h, w]
+        return torch.einsum("kbchw,bchw->bkhw", slopes, maps.detach())
 
 
 def integrated_gradients(

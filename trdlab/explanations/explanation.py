@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from trdlab.agents.agent import Agent
 from trdlab.environments import NotCopyable
+from trdlab.environments.screens import screened
 from trdlab.errors import InputError, closest
+from trdlab.estimator import MapMethod
 from trdlab.explanations.assessment import (
     assess,
     moment_of_play,
@@ -27,19 +29,25 @@ from trdlab.explanations.moment import outcome, outlook, telling
 from trdlab.explanations.moment.moment import Choice
 from trdlab.explanations.moment.outcome import Trial
 from trdlab.explanations.rules import Claim
+from trdlab.explanations.saliency import claims as mattering
+from trdlab.explanations.saliency.asking import saliency_at
+from trdlab.explanations.saliency.saliency import Saliency
 from trdlab.explanations.sections import Section, at_first
 from trdlab.printable import Printable
 from trdlab.rollouts.playing import Watch, unwatched, usual_limit
 from trdlab.time_axis import TimeAxis
 
-Part = Literal["forecast", "contrast", "episode", "calibration"]
+Part = Literal["forecast", "contrast", "episode", "calibration", "saliency"]
 PARTS: tuple[Part, ...] = get_args(Part)
+USUAL = PARTS[:4]
+"""What is told of where nothing is asked for."""
 
 _OF_PART: dict[Part, tuple[str, ...]] = {
     "forecast": ("forecast", "outcomes", "context"),
     "contrast": ("contrast", "flips", "differences", "trial", "context"),
     "episode": ("episode",),
     "calibration": ("score", "trust", "faults", "later", "others", "critic", "judged"),
+    "saliency": ("saliency", "belief"),
 }
 
 
@@ -61,6 +69,7 @@ class Explanation(Printable):
         missing: what is not known, and why, in sentences.
         observation: what the agent's forecasts are about at the moment, as its estimator is asked;
             None where nothing was asked that speaks of a moment.
+        saliency: what matters for near and for far reward; None where it was not asked for.
     """
 
     agent: Agent
@@ -74,6 +83,7 @@ class Explanation(Printable):
     max_steps: int | None = None
     missing: tuple[str, ...] = ()
     observation: NDArray[Any] | None = None
+    saliency: Saliency | None = None
 
     @property
     def time_axis(self) -> TimeAxis:
@@ -94,8 +104,11 @@ class Explanation(Printable):
         asked = [] if self.choice is None else outlook.in_brief(self.choice)  # by the user
         trust = [] if self.report is None else calibration.in_brief(self.report)
         surprise = [] if self.story is None or self.story.most is None else [self.story.most]
+        matters = [] if self.saliency is None else mattering.in_brief(self.saliency)
         brief = [*trust[:1], *moment[:2], *(asked or tried[:1]), *trust[1:2]]
-        return at_first([*brief, *surprise, *moment[2:]])
+        if self.saliency is not None and self.choice is None:
+            brief = [*matters, *brief]
+        return at_first([*brief, *surprise, *moment[2:], *matters])
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
@@ -105,10 +118,11 @@ class Explanation(Printable):
             *([] if self.choice is None else telling.sections(self.choice)),
             *([] if self.trial is None else outcome.sections(self.trial)),
             Section("episode", f"The episode with seed {self.seed}", episode),
+            *([] if self.saliency is None else mattering.sections(self.saliency)),
             *([] if self.report is None else calibration.sections(self.report)),
             Section("missing", "What is not known", notes=self.missing),
         ]
-        wanted = [name for part in self.parts or PARTS for name in _OF_PART[part]]
+        wanted = [name for part in self.parts or USUAL for name in _OF_PART[part]]
         return tuple(part for part in told if part and part.name in (*wanted, "missing"))
 
     def to_video(self, path: str | Path, what: str = "episode", **how: Any) -> Path:
@@ -154,6 +168,9 @@ def explain(
     episodes: int | None = None,
     report: CalibrationReport | None = None,
     max_steps: int | None = None,
+    components: str | None = None,
+    layer: int = 0,
+    maps: MapMethod = "gradcam",
     watch: Watch = unwatched,
 ) -> Explanation:
     """Explains an agent at a step of an episode of its own, and judges it by other episodes.
@@ -170,13 +187,17 @@ def explain(
         report: how far the forecasts can be trusted, if that is known: then no episodes are played.
         max_steps: after which an episode is cut off, if not before; by default as `usual_limit`
             says, and no sooner than the step that is explained.
+        components: those that saliency is asked about (see `parse_groups`); by default near and
+            far ones.
+        layer: the convolution that saliency is asked of, from 0.
+        maps: how its maps are made: as in the paper, or by the gradient at each place.
         watch: told how far the episodes are, after every step.
 
     Raises:
         InputError: the episode has no such step, there is no such action, no episode to judge by
             where calibration was asked for, or the report is of another agent.
     """
-    wanted = parts or PARTS
+    wanted = parts or USUAL
     limit = _limit(agent, step, max_steps)
     count = usual_episodes(agent) if episodes is None else episodes
     if report is not None:
@@ -185,12 +206,13 @@ def explain(
         raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
     is_usual = agent.copying.unasked and {"calibration", "contrast"} & set(wanted)
     copying = agent.copying if is_usual or "calibration" in parts else None
-    choice, observation, tried, story = None, None, None, None
+    choice, observation, tried, story, matters = None, None, None, None, None
     missing: list[str] = []
-    with agent.begin(seed=seed, max_steps=limit) as recording:
-        if {"forecast", "contrast"} & set(wanted):
+    film = screened if "saliency" in parts else None
+    with agent.begin(seed=seed, max_steps=limit, film=film) as recording:
+        names = [None if name is None else agent.action(name) for name in (action, foil)]
+        if {"forecast", "contrast", "saliency"} & set(wanted):
             recording.play_to(step)
-            names = (None if name is None else agent.action(name) for name in (action, foil))
             choice = moment_of_play(agent, recording.playing).choice(*names)
             observation = np.array(recording.playing.stack.observations[0])
         if "contrast" in parts and choice is not None and len(agent.action_names) < 2:
@@ -203,6 +225,9 @@ def explain(
                 tried = try_in_play(agent, recording.playing, *pair, seed=seed)
             except NotCopyable as error:
                 missing.append(f"{error.cause} So the two actions were not tried out.")
+        if "saliency" in wanted and choice is not None:
+            of = agent, recording.playing, choice.action, names[1]
+            matters = saliency_at(*of, components=components, layer=layer, method=maps, seed=seed)
         if "episode" in wanted:
             recording.play()
             (episode,) = recording.episodes()
@@ -213,9 +238,24 @@ def explain(
     if choice is not None and report is not None:
         known = replace(choice.moment, calibration=report.calibration, foils=report.foils)
         choice = replace(choice, moment=known)
+    if matters is not None and report is not None:
+        matters = matters.judged(report.trust, usual=components is None)
+    if not {"forecast", "contrast"} & set(wanted):
+        choice = None
     trial = None if tried is None else trial_of(agent, tried, report, seed=seed)
     return Explanation(
-        agent, parts, seed, step, choice, report, trial, story, limit, tuple(missing), observation
+        agent,
+        parts,
+        seed,
+        step,
+        choice,
+        report,
+        trial,
+        story,
+        limit,
+        tuple(missing),
+        observation,
+        matters,
     )
 
 

@@ -15,12 +15,14 @@ from trdlab.explanations.episode.played import Played
 from trdlab.explanations.explanation import Explanation
 from trdlab.explanations.moment.moment import Choice
 from trdlab.explanations.rules import plain_data
+from trdlab.explanations.saliency import claims as mattering
+from trdlab.explanations.saliency.saliency import Saliency
 from trdlab.explanations.words import counted
 from trdlab.formatting import decimals_for, number
 from trdlab.show.data import actions_data, axis_data, data, told_data
 from trdlab.show.document import Document, axis_words, document
 from trdlab.show.scenes import scene_of
-from trdlab.show.tables import Row, Table, action_table
+from trdlab.show.tables import Row, Table, action_table, entry_table
 from trdlab.statistics import Estimate
 
 _MOST_ROWS = 8  # of a table of components
@@ -31,18 +33,33 @@ def _(explanation: Explanation) -> Document:
     agent, choice, state = explanation.agent, explanation.choice, explanation.state
     seed = f"the episode with seed {explanation.seed}"
     heading = [agent.name]
-    if choice is not None or explanation.story is not None:
-        heading.append(seed if choice is None else f"step {explanation.step} of {seed}")
+    matters = explanation.saliency
+    is_moment = choice is not None or matters is not None
+    if is_moment or explanation.story is not None:
+        heading.append(f"step {explanation.step} of {seed}" if is_moment else seed)
     if choice is not None and explanation.parts and "contrast" not in explanation.parts:
         choice = replace(choice, foil=None)  # their difference is told to who asks for a contrast
     return Document(
         heading=" · ".join(heading),
         setting=(*axis_words(explanation.time_axis), *_played(explanation), *_forbidden(choice)),
         scene=None if state is None or agent.world is None else scene_of(agent.world, state),
-        table=None if choice is None else action_table(choice),
+        table=action_table(choice) if choice else entry_table(matters) if matters else None,
         answer=tuple(claim.sentence for claim in explanation.answer),
         sections=explanation.sections,
         folded=not explanation.parts,
+    )
+
+
+@document.register
+def _(saliency: Saliency) -> Document:
+    moment = f"step {saliency.step} of the episode with seed {saliency.seed}"
+    return Document(
+        heading=f"What matters to {saliency.agent.name} · {moment}",
+        setting=(*axis_words(saliency.time_axis), saliency.about),
+        table=entry_table(saliency),
+        answer=tuple(claim.sentence for claim in mattering.in_brief(saliency)),
+        sections=mattering.sections(saliency),
+        more="There is more: .details() returns all that there is to tell.",
     )
 
 
@@ -138,11 +155,13 @@ def _(explanation: Explanation) -> dict[str, Any]:
         "moment": _moment(explanation),
         "trial": None if trial is None else trial.to_dict(),
         "episode": None if story is None else _episode(story.played, explanation.seed),
+        "saliency": None if explanation.saliency is None else data(explanation.saliency),
         "calibration": None if report is None else data(report),
     }
 
 
 data.register(CalibrationReport, calibration.to_dict)
+data.register(Saliency, mattering.to_dict)
 
 
 @data.register

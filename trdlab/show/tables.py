@@ -3,11 +3,15 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
+
 from trdlab.arrays import FloatArray, difference
 from trdlab.explanations.moment.moment import Choice, Moment
+from trdlab.explanations.saliency.saliency import Entries, Saliency
 from trdlab.formatting import amount, decimals_for, decimals_to_tell, number
 
 Row = tuple[str, ...]
+_MOST_ENTRIES = 12  # of a table of what they add
 
 
 class Table(NamedTuple):
@@ -65,6 +69,25 @@ def action_table(choice: Choice) -> Table | None:
     heading = ("action", *axis.labels, "Q", *["total"] * has_totals, "")
     sides = "<" + ">" * len(heading[2:]) + "<"
     return Table(heading, tuple(rows), sides, styles, axis.num_components)
+
+
+def entry_table(saliency: Saliency) -> Table | None:
+    """Returns a row for each entry that counts most: what it adds to near and to far reward.
+
+    There is none of images.
+    """
+    of, groups = saliency.of, saliency.told
+    if not isinstance(of, Entries):
+        return None
+    added = np.stack([of.of(group) for group in groups], axis=1)  # [F, 1 or 2]
+    most = np.argsort(-np.abs(added).max(axis=1), kind="stable")[:_MOST_ENTRIES]
+    decimals = decimals_for(added[most].ravel())
+    rows = [
+        (of.names[i], of.values[i], *(number(float(value), decimals) for value in added[i]))
+        for i in sorted(most.tolist())
+    ]
+    labels = (f"adds to {group.label(saliency.time_axis)}" for group in groups)
+    return Table(("entry", "is", *labels), tuple(rows), "<>" + ">" * len(groups))
 
 
 def _note(moment: Moment, i: int) -> str:

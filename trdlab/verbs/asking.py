@@ -7,6 +7,7 @@ from trdlab.verbs.making import agent as find
 
 if TYPE_CHECKING:
     from trdlab.agents.places import Where
+    from trdlab.estimator import MapMethod
     from trdlab.explanations.calibration.report import CalibrationReport
     from trdlab.explanations.comparison.comparison import Comparison
     from trdlab.explanations.explanation import Explanation
@@ -64,6 +65,9 @@ def explain(
     episodes: int | None = None,
     report: "CalibrationReport | None" = None,
     max_steps: int | None = None,
+    components: str | None = None,
+    layer: int = 0,
+    maps: "MapMethod" = "gradcam",
     watch: "Watch | None" = None,
     **how: Any,
 ) -> "Explanation":
@@ -76,12 +80,16 @@ def explain(
         step: of that episode.
         action: the name or number of the action to explain, by default what the agent does.
         foil: of the one to contrast it with, by default the best other one.
-        parts: what is asked for, of forecast, contrast, episode and calibration, with commas
-            between; by default what matters most.
+        parts: what is asked for, of forecast, contrast, episode, calibration and saliency, with
+            commas between; by default what matters most, without saliency.
         episodes: by how many other episodes it is judged, 0 for not at all; by default 300 of an
             exact table, 16 of a game, and else 50.
         report: of `trdlab.calibrate` on the same agent, in place of such episodes.
         max_steps: after which an episode is cut off; by default as `usual_limit` says.
+        components: which saliency is asked about, such as `3`, `0-9` or `0-9,30-39`, which are held
+            against each other, `later` for the residual, or `all`; by default near and far ones.
+        layer: the convolution of a network that saliency is asked of, from 0.
+        maps: of that: `gradcam`, as in the paper, or `hirescam`, by the gradient at each place.
         watch: told how far the episodes are, after every step.
         how: else, as for `trdlab.agent`.
 
@@ -104,6 +112,9 @@ def explain(
         episodes=episodes,
         report=report,
         max_steps=max_steps,
+        components=components,
+        layer=layer,
+        maps=maps,
         watch=watch or unwatched,
     )
 

@@ -3,6 +3,7 @@
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trdlab.arrays import BoolArray, FloatArray
 
@@ -85,7 +86,7 @@ def _ranks(values: FloatArray) -> FloatArray:
 # ---- what is hidden ----------------------------------------------------------------------------
 
 
-def hidden_patches(image: FloatArray, side: int) -> FloatArray:
+def hidden_patches(image: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
     """Returns an image `[C, H, W]` with each patch hidden in turn: `[P, C, H, W]`, row by row.
 
     Each of its frames gets there what most of it looks like, its median, so that what stands in the

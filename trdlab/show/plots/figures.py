@@ -12,8 +12,9 @@ from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison.comparison import Comparison
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import Story, tell
-from trdlab.explanations.explanation import PARTS, Explanation, Part
+from trdlab.explanations.explanation import PARTS, USUAL, Explanation, Part
 from trdlab.explanations.moment.moment import Choice, Moment, moment_of
+from trdlab.explanations.saliency.saliency import Saliency
 from trdlab.explanations.solved import SolvedState
 from trdlab.gridworld import Gridworld
 from trdlab.show.plots.calibration import trust_figure
@@ -22,6 +23,7 @@ from trdlab.show.plots.episode import story_figure
 from trdlab.show.plots.map import solved_figure, world_figure
 from trdlab.show.plots.moment import moment_figure
 from trdlab.show.plots.outcomes import outcomes_figure
+from trdlab.show.plots.saliency import saliency_figure
 from trdlab.tabular import ExactTable
 
 Picture = Part | Literal["outcomes"]
@@ -60,6 +62,8 @@ def part_figure(explained: Explanation, part: Picture) -> Figure | None:
     agent, report, choice = explained.agent, explained.report, explained.choice
     if part == "calibration":
         return None if report is None else trust_figure(report, agent.name)
+    if part == "saliency":
+        return None if explained.saliency is None else saliency_figure(explained.saliency)
     if part == "episode":
         return None if explained.story is None else _episode(explained, explained.story)
     if choice is None or (part == "contrast" and choice.foil is None):
@@ -84,7 +88,7 @@ def picture_paths(
     """
     ending = {"episode": f"-seed-{seed}", "calibration": ""}
     moment = f"-seed-{seed}-step-{step}"
-    names: list[Picture] = [*(parts or PARTS)]
+    names: list[Picture] = [*(parts or USUAL)]
     names += ["outcomes"] * bool({"forecast", "contrast"} & set(names))
     return {name: folder / f"{name}{ending.get(name, moment)}.png" for name in names}
 
@@ -111,5 +115,6 @@ figure.register(Comparison, comparison_figure)
 figure.register(Gridworld, world_figure)
 figure.register(Moment, lambda moment, **how: moment_figure(moment.choice(), **how))
 figure.register(Played, lambda played, **how: story_figure(tell(played), **how))
+figure.register(Saliency, saliency_figure)
 figure.register(SolvedState, solved_figure)
 figure.register(Story, story_figure)

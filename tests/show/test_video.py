@@ -402,13 +402,14 @@ def test_an_explanation_without_its_episode_makes_none(tmp_path: Path):
 # ---- maps --------------------------------------------------------------------------------------
 
 
-def test_a_map_covers_what_it_speaks_of_and_leaves_the_rest():
-    picture = np.full((4, 4, 3), 100, np.uint8)
-    assert (overlaid(picture, np.zeros((2, 2))) == 60).all()
-    over = overlaid(picture, np.array([[1.0, 0.0], [0.0, -1.0]]))
-    assert over[0, 0, 0] > over[0, 0, 2]  # orange raises
-    assert over[-1, -1, 2] > over[-1, -1, 0]  # blue lowers
-    assert over[0, 0, 0] > over[1, 1, 0]
+def test_a_map_covers_what_it_speaks_of_and_darkens_the_rest():
+    picture = np.full((8, 8, 3), 100, np.uint8)
+    plain = overlaid(picture, np.zeros((2, 2)))
+    assert (plain < 100).all()
+    over = overlaid(picture, np.array([[2.0, 0.0], [0.0, -1.0]]))
+    assert over[0, 0].tolist() == [255, 176, 0]  # it raises what is expected
+    assert over[-1, -1].tolist() == [63, 183, 255]  # it lowers it
+    assert (over[-1, 0] == plain[-1, 0]).all()
 
 
 class Eyes:

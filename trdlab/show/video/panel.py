@@ -98,26 +98,26 @@ class Panel:
     rows: int = 2
     about: str = ABOUT
 
-    @property
+    @cached_property
     def pitch(self) -> int:
         """The pixels from one bar to the next."""
         places = self.axis.num_components + 1  # the residual is apart
         room = (_LETTERS * self.size - self.left - self.size) // places
         return min(_MOST_PITCH, max(room, min(_PITCH, max(_LEAST_PITCH, _MOST_WIDTH // places))))
 
-    @property
+    @cached_property
     def left(self) -> int:
         """The pixels left of the bars, where the scale stands."""
         return width_of("−0.005 ", self.size)
 
-    @property
+    @cached_property
     def width(self) -> int:
         """In pixels."""
         bars = self.left + (self.axis.num_components + 1) * self.pitch
         most = bars + width_of(self.labels[-1][1], self.size) // 2 + self.size // 2
         return even(max(_LETTERS * self.size, most))
 
-    @property
+    @cached_property
     def bars_height(self) -> int:
         """The pixels that the bars of one action can be high."""
         line = line_of(self.size)

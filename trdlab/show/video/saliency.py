@@ -10,39 +10,30 @@ from trdlab.agents.agent import Agent
 from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
 from trdlab.explanations.saliency.groups import Group
-from trdlab.explanations.saliency.maps import SaliencyMap, SaliencyMaps, enlarged
+from trdlab.explanations.saliency.maps import SaliencyMap, SaliencyMaps
 from trdlab.formatting import said
 from trdlab.rollouts.episodes import Episode
 from trdlab.show.plots import style
+from trdlab.show.plots.saliency import LOWERS, RAISES, overlay
 from trdlab.show.video import canvas
 from trdlab.show.video.beside import panel_for
 from trdlab.show.video.canvas import Frame, Sheet, even, letters_for, line_of, width_of, zoom_for
 from trdlab.show.video.panel import Row, Span
 from trdlab.show.video.sights import Sight
 
-RAISES, LOWERS = (255, 140, 0), (90, 170, 255)
-"""What the colours mean: what is seen there raises what is expected, or lowers it."""
-_STRONGEST = 0.85  # of the colour covers the screen, where it matters most
-_BEND = 0.5  # the power of a share by which it covers: weak places are seen, too
-_DIM = 0.6  # of the screen's light is left
 _BATCH = 8  # steps that are asked about together
 _PANEL = 400  # pixels: how wide a panel is, as far as the size of letters is concerned
-_LEGEND = (("raises it", RAISES), ("lowers it", LOWERS))
+_LEGEND = (("raises it", RAISES), ("lowers it", LOWERS))  # what is expected
 
 
 def overlaid(picture: Frame, shares: FloatArray) -> Frame:
-    """Returns a picture in dim grey with a map over it.
+    """Returns a darkened picture with a map over it.
 
     Args:
         picture: `[H, W, 3]`.
         shares: `[h, w]`, from −1 to 1; it covers the whole picture.
     """
-    height, width, _ = picture.shape
-    over = np.clip(enlarged(shares, height, width), -1.0, 1.0)[..., None]
-    grey = _DIM * picture.mean(axis=2, keepdims=True)
-    cover = _STRONGEST * np.abs(over) ** _BEND
-    colour = np.where(over > 0.0, np.array(RAISES), np.array(LOWERS))
-    return np.asarray(np.rint(grey * (1.0 - cover) + colour * cover), dtype=np.uint8)
+    return np.asarray(np.rint(255.0 * overlay(picture, np.clip(shares, -1.0, 1.0))), dtype=np.uint8)
 
 
 def saliency_frames(

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from trdlab.arrays import FloatArray
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.steps import LEAST_DISCOUNT
+from trdlab.formatting import DOUBT
 from trdlab.show.plots import style
 from trdlab.time_axis import axis_title, step_label
 
@@ -48,7 +49,7 @@ def seen_figure(choice: Choice, picture: Picture, title: str = "") -> Figure:
     if choice.foil is not None:
         plot_difference(axes[1], choice)
         axes[0].tick_params(labelbottom=False)
-    axes[-1].set_xlabel("step t+k that component k speaks of\n(t: the action taken now)")
+    axes[-1].set_xlabel("component k: reward of t+k (t: the action taken now)")
     style.add_legend(figure, _handles(choice), _later(choice), axis_title(moment.time_axis))
     return figure
 
@@ -83,13 +84,13 @@ def _names(choice: Choice) -> list[str]:
 def _trusted(moment: Moment, action: str) -> int:
     """Returns how many explicit components in a row are good; of an exact answer all are.
 
-    Where only what the policy does was judged, nothing is known of other actions.
+    An action that the policy hardly ever takes is judged by what came where it was forced.
     """
-    judged, is_own = moment.judged(action), moment.policy is None
-    is_own |= moment.policy is not None and bool(moment.policy[moment.index(action)] > 0.0)
     if moment.is_exact:
         return moment.time_axis.horizon
-    return judged.trust.components if judged and (is_own or moment.foils) else 0
+    is_own = moment.policy is None or bool(moment.policy[moment.index(action)] >= DOUBT)
+    judged = moment.calibration if is_own else moment.foils
+    return 0 if judged is None else judged.trust.components
 
 
 def _rewards(moment: Moment, action: str) -> FloatArray:
@@ -139,4 +140,4 @@ def _later(choice: Choice) -> str:
     for name in _names(choice):
         value = float(choice.moment.components(name)[-1])
         residual.append(f"{style.told(value, 2)} for {name}")
-    return f"not drawn, discounted: all later rewards, {' and '.join(residual)}"
+    return f"later rewards, not drawn: {', '.join(residual)} (discounted)"

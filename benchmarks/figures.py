@@ -1,8 +1,8 @@
 """Draws moments of an agent in the manner of the paper's figures 4, 5 and 7.
 
 The screen stands on the left, and on the right the reward that is expected at each step, of one
-action or of two and their difference. The agent is judged first, which takes some minutes for a
-game, so that what cannot be trusted is pale.
+action or of two and their difference. The agent is judged first, by other episodes, so that what
+cannot be trusted is pale.
 
     python benchmarks/figures.py pretrained:Breakout 151 151:LEFT:RIGHT --out pictures
 """
@@ -23,9 +23,7 @@ from trdlab.show.video.sights import sights
 
 def main() -> None:
     options = _options()
-    agent = find_agent(options.agent, env=options.env)
-    report = trdlab.calibrate(agent, episodes=options.episodes)
-    print(*(claim.sentence for claim in in_brief(report)), sep="\n")
+    agent, report = find_agent(options.agent, env=options.env), None
     for moment in options.moments:
         step, action, foil = (*moment.split(":"), "", "")[:3]
         explained = trdlab.explain(
@@ -35,8 +33,11 @@ def main() -> None:
             step=int(step),
             action=action or None,
             foil=foil or None,
+            episodes=options.episodes if report is None else None,
             report=report,
         )
+        if report is None and (report := explained.report) is not None:
+            print(*(claim.sentence for claim in in_brief(report)), sep="\n")
         path = options.out / f"{options.name}-{moment.replace(':', '-')}.png".lower()
         draw(explained, path, is_alone=not foil)
 

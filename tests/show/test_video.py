@@ -122,6 +122,11 @@ def test_what_comes_later_does_not_set_the_scale_unless_there_is_nothing_else():
     assert Span().over(np.zeros((1, 3)))[:2] == (0.0, 0.0)
 
 
+def test_only_finite_numbers_have_bars():
+    with pytest.raises(InputError, match="A component is nan"):
+        Span().over(np.array([[0.0, np.nan]]))
+
+
 @pytest.mark.parametrize("horizon", [0, 1, 40, 300])
 def test_a_panel_has_room_for_any_number_of_components(horizon: int):
     panel = Panel(TimeAxis(0.9, horizon), NAMES, 200, 12)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray
+from trdlab.errors import InputError
 from trdlab.formatting import decimals_for, plain
 from trdlab.show.plots import style
 from trdlab.show.video.canvas import Frame, Sheet, even, line_of, shortened, width_of
@@ -39,7 +40,15 @@ class Span(NamedTuple):
     news: int = 0
 
     def over(self, rows: FloatArray) -> "Span":
-        """Returns what also shows more rows `[R, N+1]` of bars; a large residual is cut off."""
+        """Returns what also shows more rows `[R, N+1]` of bars; a large residual is cut off.
+
+        Raises:
+            InputError: a bar has no finite height.
+        """
+        if not np.isfinite(rows).all():
+            raise InputError(
+                f"A component is {rows[~np.isfinite(rows)][0]}.", "Only finite ones can be drawn."
+            )
         sizes = np.abs(rows)
         matters = sizes[:, :-1].sum(axis=1).max() > _MATTERS * sizes[:, -1].max()
         room = _ROOM * float(sizes[:, :-1].max(initial=0.0)) if matters else np.inf

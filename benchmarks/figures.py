@@ -35,6 +35,7 @@ def main() -> None:
             foil=foil or None,
             episodes=options.episodes if report is None else None,
             report=report,
+            max_steps=options.max_steps,
         )
         if report is None and (report := explained.report) is not None:
             print(*(claim.sentence for claim in in_brief(report)), sep="\n")
@@ -65,6 +66,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--env")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--episodes", type=int, default=16)
+    parser.add_argument("--max-steps", type=int, help="of these episodes, and of the one drawn")
     parser.add_argument("--name", default="moment", help="what the files begin with")
     parser.add_argument("--out", type=Path, default=Path("pictures"))
     return parser.parse_args()

@@ -235,8 +235,7 @@ _NUMBER = "(rank correlation {value:correlation})"
 @SALIENCY.kinds(
     {
         "redrawn-good": (
-            f"With new weights, what counts {{group:span}} is other places or entries {_NUMBER}, "
-            "as it should be."
+            f"With new weights, other {{parts:text}} count {{group:span}} {_NUMBER}, as should be."
         ),
         "redrawn-bad": (
             "Do not believe what counts {group:span}: with new weights it is much the same "
@@ -274,9 +273,10 @@ def hidden(saliency: Saliency) -> Iterator[Found]:
 def _checked(saliency: Saliency, name: str) -> Iterator[Found]:
     if isinstance(saliency.of, Entries) and saliency.of.method != "gradients":
         return
+    parts = "places" if isinstance(saliency.of, Places) else "entries"
     for group in saliency.told:
         check = getattr(saliency.of.checks(group), name)
-        fields = {"group": tuple(group), "value": check.value}
+        fields = {"parts": parts, "group": tuple(group), "value": check.value}
         yield f"{name}-{check.verdict.replace(' ', '-')}", fields
 
 

@@ -12,7 +12,7 @@ from trdlab.explanations.calibration.report import CalibrationReport
 from trdlab.explanations.comparison.comparison import Comparison
 from trdlab.explanations.episode.played import Played
 from trdlab.explanations.episode.story import Story, tell
-from trdlab.explanations.explanation import PARTS, USUAL, Explanation, Part
+from trdlab.explanations.explanation import USUAL, Explanation, Part
 from trdlab.explanations.moment.moment import Choice, Moment, moment_of
 from trdlab.explanations.saliency.saliency import Saliency
 from trdlab.explanations.solved import SolvedState
@@ -27,6 +27,7 @@ from trdlab.show.plots.saliency import saliency_figure
 from trdlab.tabular import ExactTable
 
 Picture = Part | Literal["outcomes"]
+_ORDER: tuple[Part, ...] = ("contrast", "forecast", "episode", "saliency", "calibration")
 
 
 @singledispatch
@@ -51,7 +52,7 @@ def explanation_figure(explained: Explanation, part: Part | None = None) -> Figu
     Raises:
         InputError: there is nothing to draw.
     """
-    for one in (part,) if part else ("contrast", *PARTS):
+    for one in (part,) if part else _ORDER:
         if (found := part_figure(explained, one)) is not None:
             return found
     raise InputError("There is nothing to draw.", "Ask for a part that there is a picture of.")

@@ -127,6 +127,9 @@ def _screens(saliency: Saliency, of: Places) -> Figure:
         if pair is not None:
             faded = any(map(saliency.is_doubtful, pair))
             plot_saliency(axes[row, 2], _difference(maps, pair), screen, faded=faded)
+            if row:  # the titles stand above the first row
+                for ax in axes[row]:
+                    ax.set_title("")
         axes[row, 0].set_ylabel(method, fontsize=style.TEXT, color=style.MUTED)
     _explain(figure, saliency, pair is not None)
     return figure

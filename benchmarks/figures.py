@@ -12,6 +12,8 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+
 import trdlab
 from trdlab.agents.naming import find_agent
 from trdlab.explanations.calibration.claims import in_brief
@@ -19,6 +21,7 @@ from trdlab.explanations.explanation import Explanation
 from trdlab.show.plots.seen import seen_figure
 from trdlab.show.plots.style import save
 from trdlab.show.video.sights import sights
+from trdlab.time_axis import step_label
 
 
 def main() -> None:
@@ -54,7 +57,9 @@ def draw(explained: Explanation, path: Path, *, is_alone: bool) -> None:
     title = f"{explained.agent.name}, step {explained.step} of the episode with seed "
     path.parent.mkdir(parents=True, exist_ok=True)
     save(seen_figure(choice, picture, f"{title}{explained.seed}"), path)
-    print(f"Picture: {path.name}")
+    ahead = story.played.episode.rewards[explained.step :][: choice.time_axis.num_steps]
+    came = ", ".join(step_label(step) for step in np.flatnonzero(ahead).tolist()) or "no step"
+    print(f"{path.name}: reward came at {came}")
 
 
 def _options() -> argparse.Namespace:

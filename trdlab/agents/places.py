@@ -12,20 +12,22 @@ from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 
 from trdlab.agents.models import Model, World, find_model, is_model, model_of
 from trdlab.decomposition import TimeAxis
+from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments, say_arguments
 from trdlab.environments.batches import Make
 from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.interface import Interface
+from trdlab.environments.paying import PAYS, paying
 from trdlab.environments.sources import EnvSource
 from trdlab.errors import InputError
-from trdlab.rollouts.branches import Copying
+from trdlab.rollouts.branches import Effort
 from trdlab.tabular import MDP
 
 if TYPE_CHECKING:
     from trdlab.deep.settings import TrainSettings
 
 # a game is long, and a copy plays all of it again
-_OF_GAMES = Copying(judged=16, episodes=12, moments=2, copies=2, tries=10, unasked=False)
+_OF_GAMES = Effort(judged=16, episodes=12, moments=2, copies=2, tries=10, unasked=False)
 
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""
@@ -97,7 +99,7 @@ class Place:
         env_arguments: what it is made with, as `KEY=VALUE`.
         is_named: whether it can be found again by its name.
         mdp: the model that it is; None where it carries none.
-        copying: how much is copied of states there.
+        effort: how much is played and copied there to judge who acts.
     """
 
     make: Make
@@ -105,7 +107,7 @@ class Place:
     env_arguments: tuple[str, ...] = ()
     is_named: bool = True
     mdp: MDP | None = None
-    copying: Copying = Copying()  # noqa: RUF009  it is frozen
+    effort: Effort = Effort()  # noqa: RUF009  it is frozen
 
     def is_model(self, mdp: MDP) -> bool:
         """Returns whether episodes here go as a model says."""
@@ -160,21 +162,22 @@ def find_place(
         place = place_of(TrainSettings("atari", source, env_arg=words))
         return replace(place, env_arguments=tuple(env_arguments))
     arguments = parse_arguments(env_arguments)
+    pays = arguments.pop(PAYS, None)
 
-    def made(num_envs: int, seed: int) -> GymEnvironments:
-        return GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments)
+    def made(num_envs: int, seed: int) -> Environments:
+        return paying(GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments), pays)
 
-    called = str(env) if named else "the environment"
-    return Place(made, called, tuple(env_arguments), named, _mdp_of(env))
+    called, mdp = str(env) if named else "the environment", None if pays else _mdp_of(env)
+    return Place(made, called, tuple(env_arguments), named, mdp)
 
 
 def place_of(settings: "TrainSettings") -> Place:
     """Returns where the agent of a run acts."""
     from trdlab.training.setup import make_environments
 
-    copying = _OF_GAMES if settings.kind == "atari" else Copying()
+    effort = _OF_GAMES if settings.kind == "atari" else Effort()
     make = partial(make_environments, settings)
-    return Place(make, settings.env, settings.env_arg, copying=copying)
+    return Place(make, settings.env, settings.env_arg, effort=effort)
 
 
 def _is_game(env: str) -> bool:

@@ -1,10 +1,18 @@
-"""What there is to say of what matters: where, or which entries, and whether to believe that."""
+"""What there is to say of what matters: where, or which entries."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from trdlab.explanations.rules import Claim, Fields, Found, every, plain_data
+from trdlab.explanations.saliency.belief import (
+    BAD,
+    certain,
+    doubtful,
+    hidden,
+    redrawn,
+    tried_out,
+)
 from trdlab.explanations.saliency.groups import Group
 from trdlab.explanations.saliency.maps import overlap
 from trdlab.explanations.saliency.saliency import SALIENCY, Entries, Places, Saliency
@@ -21,7 +29,7 @@ _EXPECTS = "{whose:text} {group:span}"
 
 def in_brief(saliency: Saliency) -> list[Claim]:
     """Returns what matters most, and first of all what is not to be believed."""
-    doubts = [of for of in every(saliency, *redrawn, *hidden) if of.kind in _BAD]
+    doubts = [of for of in every(saliency, *redrawn, *hidden) if of.kind in BAD]
     told = every(saliency, *apart, most_hidden, hangs_on, *tried, *shifts)
     return list(at_first([*doubts[:2], *every(saliency, doubtful)[:1], *told]))
 
@@ -226,90 +234,7 @@ def sums(saliency: Saliency) -> Iterator[Found]:
             yield "adds" if total > 0.0 else "takes", fields
 
 
-# ---- whether to believe it ---------------------------------------------------------------------
-
-_BAD = ("redrawn-bad", "hidden-bad")
-_NUMBER = "(rank correlation {value:correlation})"
-
-
-@SALIENCY.kinds(
-    {
-        "redrawn-good": (
-            f"With new weights, other {{parts:text}} count {{group:span}} {_NUMBER}, as should be."
-        ),
-        "redrawn-bad": (
-            "Do not believe what counts {group:span}: with new weights it is much the same "
-            f"{_NUMBER}."
-        ),
-        "redrawn-not-tested": (
-            "Whether what counts {group:span} depends on what was learned could not be tested."
-        ),
-    }
-)
-def redrawn(saliency: Saliency) -> Iterator[Found]:
-    """Whether it depends on what was learned."""
-    yield from _checked(saliency, "redrawn")
-
-
-@SALIENCY.kinds(
-    {
-        "hidden-good": (
-            f"Where much counts {{group:span}}, hiding changes more {_NUMBER}, as it should."
-        ),
-        "hidden-bad": (
-            "Do not believe what counts {group:span}: hiding changes hardly more there than "
-            f"elsewhere {_NUMBER}."
-        ),
-        "hidden-not-tested": (
-            "Whether hiding changes more where much counts {group:span} could not be tested."
-        ),
-    }
-)
-def hidden(saliency: Saliency) -> Iterator[Found]:
-    """Whether hiding changes more where it is strong."""
-    yield from _checked(saliency, "hidden")
-
-
-def _checked(saliency: Saliency, name: str) -> Iterator[Found]:
-    if isinstance(saliency.of, Entries) and saliency.of.method != "gradients":
-        return
-    parts = "places" if isinstance(saliency.of, Places) else "entries"
-    for group in saliency.told:
-        check = getattr(saliency.of.checks(group), name)
-        fields = {"parts": parts, "group": tuple(group), "value": check.value}
-        yield f"{name}-{check.verdict.replace(' ', '-')}", fields
-
-
-@SALIENCY.rule("This is of a solved model, so there is nothing to doubt.")
-def certain(saliency: Saliency) -> Iterator[Fields]:
-    if isinstance(saliency.of, Entries) and saliency.of.method == "exchange":
-        yield {}
-
-
-@SALIENCY.rule("This was tried out, with what was met at {count:count} other moments.")
-def tried_out(saliency: Saliency) -> Iterator[Fields]:
-    if isinstance(saliency.of, Entries) and saliency.of.method == "hiding":
-        yield {"count": saliency.of.met}
-
-
-@SALIENCY.rule(
-    f"{_EXPECTS} has not proved better than a guess, so what that hangs on tells little."
-)
-def doubtful(saliency: Saliency) -> Iterator[Fields]:
-    for group in saliency.told:
-        if saliency.is_doubtful(group):
-            yield saliency.whose | {"group": tuple(group)}
-
-
-def caption(saliency: Saliency, group: Group) -> str:
-    """Returns in a few words whether to believe an attribution, for beneath a picture of it."""
-    checks = saliency.of.checks(group)
-    found = []
-    for name, check in zip(("weights", "hiding"), checks, strict=True):
-        verdict = {"good": "passed", "bad": "failed", "not tested": "not tested"}[check.verdict]
-        number = "" if check.verdict == "not tested" else f" ({check.value:.2f})"
-        found.append(f"{name}: {verdict}{number}")
-    return ", ".join(found).replace("-", "−")
+# ---- as plain data -----------------------------------------------------------------------------
 
 
 def to_dict(saliency: Saliency) -> Fields:

@@ -8,7 +8,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from trdlab.arrays import FloatArray
-from trdlab.explanations.saliency.claims import caption
+from trdlab.explanations.saliency.belief import caption
 from trdlab.explanations.saliency.groups import Group
 from trdlab.explanations.saliency.maps import SaliencyMap, SaliencyMaps, enlarged
 from trdlab.explanations.saliency.saliency import Entries, Places, Saliency

@@ -13,6 +13,7 @@ COMMANDS = {
     "gridworld": "trdlab.cli.gridworld",
     "tabular": "trdlab.cli.tabular",
     "explain": "trdlab.cli.explain",
+    "report": "trdlab.cli.report",
     "compare": "trdlab.cli.compare",
     "agent": "trdlab.cli.agent",
     "fit": "trdlab.cli.fit",

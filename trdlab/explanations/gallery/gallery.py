@@ -1,4 +1,4 @@
-"""The reward gallery: rewards that really came, by their value and by what changed on the screen."""
+"""The reward gallery: rewards that really came, by value and by what changed on the screen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -205,10 +205,10 @@ class Gallery:
             if (group := group_of.get(one)) is not None:
                 counts[group] = counts.get(group, 0) + 1
         ordered = dict(sorted(counts.items(), key=lambda pair: (-pair[1], pair[0])))
-        shown: list[int] = []
-        for group in ordered:  # one of each group, the commonest first
-            shown.append(next(i for i in followed.tolist() if group_of.get(i) == group))
-        shown += [i for i in dict.fromkeys(followed.tolist()) if i not in shown]
+        those = list(dict.fromkeys(followed.tolist()))
+        # one of each group, the commonest first
+        shown = [next(i for i in those if group_of.get(i) == group) for group in ordered]
+        shown += [i for i in those if i not in shown]
         return Alike(
             component, level, len(nearest), len(followed), ordered, tuple(shown[:EXAMPLES])
         )
@@ -227,7 +227,9 @@ def gallery_of(recorded: Sequence[Recorded], reel: Reel) -> Gallery:
     paid: list[BoolArray] = [of.episode.rewards != 0.0 for of in recorded]
     share = float(np.concatenate(paid).mean())
     places: list[tuple[int, int]] = [
-        (number, step) for number, flags in enumerate(paid) for step in np.flatnonzero(flags)
+        (number, step)
+        for number, flags in enumerate(paid)
+        for step in np.flatnonzero(flags).tolist()
     ]
     seen: Sequence[Change | None] = [None] * len(places)
     if share <= _MOST_PAID and all(of.pictures for of in recorded):

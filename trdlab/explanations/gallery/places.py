@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import binary_dilation, label
 
-from trdlab.arrays import BoolArray
+from trdlab.arrays import BoolArray, FloatArray
 from trdlab.rollouts.reel import Picture, Reel
 
 Box = tuple[int, int, int, int]
@@ -14,8 +15,8 @@ Box = tuple[int, int, int, int]
 BEFORE, AFTER = 3, 3
 """Pictures on either side of a reward that are compared."""
 _VISIBLE = 24  # of 255: a smaller difference is no change
-_COMMON = 0.5  # of all rewards: what changes with more of them, such as a score, tells none apart
-_FEWEST = 4  # rewards by which that is judged
+_NEAR = 2  # pixels: what is no further apart is one patch
+_LEAST = 0.2  # of the largest patch: a smaller one does not count
 _ROWS, _COLUMNS = ("top", "middle", "bottom"), ("left", "centre", "right")
 
 
@@ -24,7 +25,7 @@ class Change(NamedTuple):
 
     Args:
         place: in words, a ninth of the screen; empty where nothing changed.
-        box: around all of it; None where nothing changed.
+        box: around it; None where nothing changed.
     """
 
     place: str
@@ -35,24 +36,18 @@ def changes(places: Sequence[tuple[Sequence[int], int]], reel: Reel) -> list[Cha
     """Returns what changed for good with each of some rewards.
 
     A pixel has changed for good if it differs between each of the last pictures before and each of
-    the next ones after. What moves, such as a ball, does not. Nor does what changes with most
-    rewards, such as the score, if there is anything else.
+    the next ones after. What moves, such as a ball, does not. Of several patches, the one is told
+    of that changes least often with other rewards: so it is a brick, and not the score.
 
     Args:
         places: of each reward, the numbers of the pictures of its episode, and its step.
         reel: the pictures.
     """
     masks = [_changed(numbers, step, reel) for numbers, step in places]
-    common: dict[tuple[int, ...], BoolArray] = {}
+    often: dict[tuple[int, ...], FloatArray] = {}
     for shape in {mask.shape for mask in masks}:
-        alike = [mask for mask in masks if mask.shape == shape]
-        counts = sum(mask.astype(np.int64) for mask in alike)
-        is_common = np.asarray(counts > _COMMON * len(alike))
-        common[shape] = is_common if len(alike) >= _FEWEST else np.zeros_like(is_common)
-    own = (mask & ~common[mask.shape] for mask in masks)
-    return [
-        _change(rest if rest.any() else mask) for mask, rest in zip(masks, own, strict=True)
-    ]
+        often[shape] = np.mean([mask for mask in masks if mask.shape == shape], axis=0)
+    return [_change(mask, often[mask.shape]) for mask in masks]
 
 
 def _changed(numbers: Sequence[int], step: int, reel: Reel) -> BoolArray:
@@ -73,11 +68,21 @@ def _differ(one: Picture, other: Picture) -> BoolArray:
     return np.asarray((apart > _VISIBLE).any(axis=2))
 
 
-def _change(mask: BoolArray) -> Change:
-    """Returns where the middle of a mask `[H, W]` lies, and what it spans."""
-    rows, columns = np.nonzero(mask)
-    if not len(rows):
+def _change(mask: BoolArray, often: FloatArray) -> Change:
+    """Returns where the rarest patch of a mask `[H, W]` lies, and what it spans.
+
+    Args:
+        mask: what has changed.
+        often: `[H, W]`, with which share of all rewards each pixel changes.
+    """
+    patches, count = label(binary_dilation(mask, iterations=_NEAR))
+    patches = np.where(mask, patches, 0)
+    sizes = np.bincount(patches.ravel(), minlength=count + 1)[1:]
+    if not count:
         return Change("", None)
+    common = np.bincount(patches.ravel(), often.ravel(), minlength=count + 1)[1:]
+    rare = np.where(sizes >= _LEAST * sizes.max(), common / np.maximum(sizes, 1), np.inf)
+    rows, columns = np.nonzero(patches == 1 + int(rare.argmin()))
     height, width = mask.shape
     row, column = (
         min(2, int(3 * np.median(at) / size)) for at, size in ((rows, height), (columns, width))

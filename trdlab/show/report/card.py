@@ -2,6 +2,7 @@
 
 from trdlab.agents.agent import Agent
 from trdlab.environments.arguments import parse_arguments, say_arguments
+from trdlab.explanations.words import counted
 
 
 def card(agent: Agent) -> list[tuple[str, str]]:
@@ -36,6 +37,6 @@ def _ahead(horizon: int, width: int) -> str:
     """
     if not horizon:
         return "only all of it together"
-    if width > 1:
-        return f"{horizon * width:,} steps in groups of {width}, then the rest"
-    return f"{horizon:,} steps one by one, then the rest" if horizon > 1 else "1 step, then the rest"
+    steps = counted(horizon * width, "step")
+    how = f" in groups of {width}" if width > 1 else " one by one" if horizon > 1 else ""
+    return f"{steps}{how}, then the rest"

@@ -102,7 +102,7 @@
     const frames = came.clip.map(([k, picture]) => {
       const canvas = el("canvas");
       canvas.setAttribute("role", "img");
-      const word = k < 0 ? `${-k} before` : k === 0 ? "before" : k === 1 ? "reward" : `${k - 1} after`;
+      const word = k < 1 ? `${1 - k} before` : k > 1 ? `${k - 1} after` : came.reward < 0 ? "cost" : "reward";
       canvas.setAttribute("aria-label", word);
       paint(canvas, picture, k >= 1 ? came.box : null);
       return el("div", { className: k === 1 ? "after" : "" }, canvas, el("span", { textContent: word }));
@@ -150,22 +150,15 @@
 
   // ---- bars ----------------------------------------------------------------------------------
 
-  /** The largest and the least of all bars that are shown in this episode, so that none jumps. */
+  /** One scale for the whole episode, so that bars can be compared; the very largest leave it. */
   const scale = (function () {
-    let low = 0, high = 0;
-    const last = N === 0 ? 1 : N;
-    for (let t = 0; t < T; t++) {
-      for (const a of D.usual[t]) {
-        if (a === null || a === undefined) continue;
-        for (let i = 0; i < last; i++) {
-          const value = D.components[t][a][i];
-          if (value > high) high = value;
-          if (value < low) low = value;
-        }
-      }
-    }
-    if (high === low) high = 1;
-    return { low: low * 1.08, high: high * 1.08 };
+    const shown = D.usual.map(([one], t) => D.components[t][one].slice(0, N || 1));
+    const end = (found) => {
+      const sizes = shown.map((values) => Math.max(0, ...values.map(found))).sort((x, y) => x - y);
+      return 1.1 * sizes[Math.floor(0.98 * (T - 1))];
+    };
+    const low = -end((x) => -x), high = end((x) => x);
+    return low === high ? { low: 0, high: 1 } : { low, high };
   })();
 
   function ticks() {
@@ -179,7 +172,7 @@
 
   /** Where the bars of a component stand, in pixels; the rest is set apart. */
   function place(width) {
-    const left = 44, right = 8, gap = N ? 0.8 : 0;
+    const left = 44, right = 26, gap = N ? 0.8 : 0;
     const each = (width - left - right) / (N + 1 + gap);
     return { left, each, at: (i) => left + each * (i + (i === N ? gap : 0)) };
   }
@@ -211,7 +204,9 @@
         canvas.append(svg("rect", { class: kind + pale, x, y: from, width: Math.max(0.8, thick - 0.6), height: Math.max(0.7, to - from) }));
         if (shown !== value) { // it leaves the scale: a gap in the bar, and its number above
           canvas.append(svg("rect", { x: x - 1, y: from + 8, width: thick + 2, height: 4, fill: "var(--card)" }));
-          canvas.append(svg("text", { class: "number", x: Math.min(x + thick / 2 + (k ? 12 : -12), width - 14), y: from - 5, "text-anchor": "middle" }, said(value)));
+          const side = drawn.length > 1 && each < 60 ? (k ? "start" : "end") : "middle";
+          const shift = side === "middle" ? thick / 2 : k ? -2 : thick - 2;
+          canvas.append(svg("text", { class: "number", x: x + shift, y: from - 5, "text-anchor": side }, said(value)));
         }
       });
     });
@@ -252,6 +247,9 @@
 
   function legend() {
     const t = now.step, chosen = pair(t), parts = [];
+    const name = (a) => (a === null || a === undefined ? "" : `: ${D.actions[a]}`);
+    byId("action").options[0].textContent = `what it does${name(D.usual[t][0])}`;
+    byId("foil").options[0].textContent = `the next best${now.foil === "" ? name(chosen[1]) : ""}`;
     const add = (kind, text) => parts.push(el("span", {}, el("i", { className: `i-${kind}` }), text));
     chosen.forEach((a, k) => {
       if (a !== null) add(k ? "other" : "one", `${D.actions[a]}: ${said(sum(row(t, a)))} in all`);

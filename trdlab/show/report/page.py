@@ -15,11 +15,13 @@ from markupsafe import Markup
 from trdlab import __version__
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration.calibration import Calibration
+from trdlab.explanations.calibration.claims import verdicts
 from trdlab.explanations.episode.story import Story, place
 from trdlab.explanations.explanation import Explanation
 from trdlab.explanations.gallery.claims import group_claims, likeness
 from trdlab.explanations.gallery.gallery import Came, Gallery, Group
 from trdlab.explanations.moment.moment import Moment
+from trdlab.explanations.moment.telling import in_brief
 from trdlab.explanations.rules import plain_data
 from trdlab.explanations.words import when_of
 from trdlab.rollouts.reel import Reel
@@ -32,11 +34,16 @@ from trdlab.show.report.recording import Take
 from trdlab.show.report.told import Told
 
 SCHEMA = "trdlab.report/1"
+MOST_ANSWERS = 3
+"""Sentences below the first ones."""
 EXAMPLES = 4
 """Rewards of a group that are shown."""
 AROUND = (-6, -3, 0, 1, 3)
 """The pictures of a reward: how many steps from the one at which it was earned."""
 
+UNTESTED = "That has not been tested: no other episodes were played to judge these forecasts by."
+
+_FIRST = ("first-reward", "first-expected")
 _HERE = Path(__file__).parent
 _TRUST = ("score", "trust", "faults", "later", "others", "critic", "judged")
 _UNSAFE = {ord(c): f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"}
@@ -69,8 +76,8 @@ def html(material: Material) -> str:
     """Returns the page."""
     explained, page = material.explained, document(material.explained)
     script, style = (_read(f"page.{kind}") for kind in ("js", "css"))
-    lead = material.told.sentences_of(explained.step)[:1]
-    answer = [sentence for sentence in page.answer if sentence not in lead]
+    lead, trusted = _lead(material), _trusted_in_short(material)
+    answer = [sentence for sentence in page.answer if sentence not in (lead, trusted)]
     claims = group_claims(material.gallery)
     trust = [section for section in page.sections if section.name in _TRUST]
     made = Environment(
@@ -79,8 +86,9 @@ def html(material: Material) -> str:
     return made.render(
         title=explained.agent.name,
         setting=page.setting,
-        lead=lead[0] if lead else "",
-        answer=answer,
+        lead=lead,
+        trusted=trusted,
+        answer=answer[:MOST_ANSWERS],
         names=explained.agent.action_names,
         steps=len(material.take.recorded.episode),
         seed=explained.seed,
@@ -91,15 +99,29 @@ def html(material: Material) -> str:
         groups=[claim.sentence for claim in claims] if material.gallery.groups else [],
         empty="" if material.gallery.groups else claims[0].sentence,
         trust=trust,
+        untested=UNTESTED,
         details=[section for section in page.sections if section.name not in _TRUST],
         card=card(explained.agent),
         version=__version__,
-        script=Markup(script),  # noqa: S704  it is a file of this package
-        style=Markup(style),  # noqa: S704
+        script=Markup(script),
+        style=Markup(style),
         script_hash=_hash(script),
         style_hash=_hash(style),
-        data=Markup(data(material).translate(_UNSAFE)),  # noqa: S704  nothing in it can end it
+        data=Markup(data(material).translate(_UNSAFE)),
     )
+
+
+def _lead(material: Material) -> str:
+    """Returns when the first reward is expected, or else what matters most of the moment."""
+    choice = material.explained.choice
+    claims = [] if choice is None else in_brief(choice)
+    ahead = [claim for claim in claims if claim.kind in _FIRST] or claims
+    return ahead[0].sentence if ahead else ""
+
+
+def _trusted_in_short(material: Material) -> str:
+    report = material.explained.report
+    return UNTESTED if report is None else verdicts(report)[0].sentence
 
 
 def data(material: Material) -> str:

@@ -82,7 +82,7 @@ def record(
                 seen.append(here)
             recording.play(playing.steps + 1, watch=watch, what="an episode to show")
         (episode,) = recording.episodes()
-    pictures, states, texts = tuple(films[0].pictures), episode.states, ()
+    pictures, states, texts = tuple(films[0].pictures), episode.states, tuple[str, ...]()
     if agent.world is not None and not agent.is_away and states is not None:
         pictures, texts = _of_states(agent.world, states.tolist(), reel)
     elif not pictures and seen and seen[0].size <= _MOST_SHOWN:

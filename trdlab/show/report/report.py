@@ -144,7 +144,7 @@ def _opening(agent: Agent, take: Take) -> int:
         return 0
     ahead = foreseen(played)
     if ahead:
-        return max(0, ahead[0].step - min(ahead[0].steps, AHEAD))
+        return int(max(0, ahead[0].step - min(ahead[0].steps, AHEAD)))
     most = tell(played).most
     return 0 if most is None else min(place(most), len(played.episode) - 1)
 

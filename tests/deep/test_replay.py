@@ -158,12 +158,16 @@ def assert_same(memory: ReplayBuffer, recorder: Recorder) -> None:
         observation, action, reward, discount, following, steps = windows[name]
         np.testing.assert_array_equal(batch.observations[row], observation)
         np.testing.assert_array_equal(batch.next_observations[row], following)
-        assert batch.observations.dtype == recorder.dtype
+        assert np.asarray(batch.observations).dtype == recorder.dtype
         assert batch.actions[row] == action
         assert batch.rewards[row] == pytest.approx(reward, rel=1e-6, abs=1e-6)
         assert batch.discounts[row] == np.float32(discount)
         assert batch.steps[row] == steps
         assert batch.extras["logits"][row].tolist() == [name, 2 * name, 3 * name]
+
+
+DEVICES = pytest.mark.parametrize("device", [None, "cpu"])
+"""Where frames lie: in the memory of the CPU; and on a device, for which it stands in."""
 
 
 def make(capacity: int, kind=IMAGE, **options) -> ReplayBuffer:
@@ -182,9 +186,10 @@ def make(capacity: int, kind=IMAGE, **options) -> ReplayBuffer:
     life=st.sampled_from([0.0, 0.2]),
     time_limit=st.sampled_from([None, 5, 9]),
     turns=st.integers(1, 90),
+    device=st.sampled_from([None, "cpu"]),
 )
 def test_windows_are_those_of_the_recorded_history(
-    seed, width, stack, num_envs, padding, kind, life, time_limit, turns
+    seed, width, stack, num_envs, padding, kind, life, time_limit, turns, device
 ):
     recorder = Recorder(seed, *kind, num_envs, life=life, time_limit=time_limit)
     memory = make(
@@ -195,6 +200,7 @@ def test_windows_are_those_of_the_recorded_history(
         num_envs=num_envs,
         padding=padding,
         time_limit=time_limit,
+        device=device,
     )
     recorder.play(memory, turns)
     assert_same(memory, recorder)
@@ -202,9 +208,10 @@ def test_windows_are_those_of_the_recorded_history(
 
 @pytest.mark.parametrize("width", [1, 3, 5])
 @pytest.mark.parametrize("num_envs", [1, 3])
-def test_at_every_moment_of_a_long_run(width, num_envs):
-    recorder = Recorder(1, *IMAGE, num_envs)
-    memory = make(70 * num_envs, width=width, stack=4, num_envs=num_envs)  # chunks of two
+@DEVICES
+def test_at_every_moment_of_a_long_run(width, num_envs, device):
+    recorder = Recorder(1, *IMAGE, num_envs)  # into chunks of two
+    memory = make(70 * num_envs, width=width, stack=4, num_envs=num_envs, device=device)
     for _ in range(60):
         recorder.play(memory, 5)
         assert_same(memory, recorder)
@@ -311,9 +318,11 @@ def test_the_same_seed_draws_the_same():
 
 @pytest.mark.parametrize("kind", [IMAGE, VECTOR])
 @pytest.mark.parametrize("turns", [3, 250])
-def test_a_saved_memory_goes_on_as_if_nothing_had_happened(kind, turns):
+@DEVICES
+def test_a_saved_memory_goes_on_as_if_nothing_had_happened(kind, turns, device):
     recorder = Recorder(4, *kind, 2, life=0.1)
-    memory, again = (make(140, kind, width=3, num_envs=2, stack=4) for _ in range(2))
+    options = {"width": 3, "num_envs": 2, "stack": 4}
+    memory, again = (make(140, kind, **options, device=of) for of in (None, device))
     recorder.play(memory, turns)
     saved = pickle.loads(pickle.dumps(memory.state_dict()))
     saved["settings"] = json.loads(json.dumps(saved["settings"]))

@@ -83,6 +83,16 @@ def test_copied_layers_begin_as_the_agent_s_and_leave_these_alone(run):
     assert all(torch.equal(of, before[name]) for name, of in own.state_dict().items())
 
 
+def test_another_fit_of_a_run_has_an_epsilon_of_its_own(run, tmp_path):
+    """That of the fit in the run's folder is a part of that fit alone."""
+    few = {"horizon": 2, "steps": 300, "most_updates": 50}
+    for epsilon, name in ((0.0, "without"), (0.3, "with")):
+        out = tmp_path / name
+        for agent in (trdlab.fit(str(run), epsilon=epsilon, out=out, **few), find_agent(str(out))):
+            assert getattr(agent.policy, "epsilon", 0.0) == epsilon
+            assert not isinstance(getattr(agent.policy, "policy", None), EpsilonGreedy)
+
+
 def test_a_fit_goes_wherever_its_run_goes(run, tmp_path, monkeypatch):
     moved = tmp_path / "elsewhere"
     shutil.copytree(run, moved)

@@ -156,10 +156,10 @@ def _run(name: str, env: Where | None, env_arguments: Sequence[str], *, joint: b
 def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent:
     """Returns the agent of a fit, in a folder: who was fitted, with what was learned of it."""
     estimator, interface, whose = load_fit(Path(name))
-    of_run = run_of(Path(name))
+    of_run, told = run_of(Path(name)), dict[str, Any](joint=True)  # a fit counts its own ε
     if of_run is not None:  # it goes wherever the run goes
-        where: dict[str, Any] = {"env": env, "env_arguments": env_arguments, "joint": True}
-        agent = find_agent(f"{of_run[0]}@{of_run[1]}", **where)
+        told |= {"env": env, "env_arguments": env_arguments}
+        agent = find_agent(f"{of_run[0]}@{of_run[1]}", **told)
         return _with_fit(agent, estimator, whose)
     if whose.agent is None:
         raise InputError(
@@ -169,7 +169,8 @@ def _fitted(name: str, env: Where | None, env_arguments: Sequence[str]) -> Agent
     is_own = env is None
     if env is None:
         env, env_arguments = whose.env, whose.env_arguments
-    of = find_agent(whose.agent, gamma=whose.solved_for, env=env, env_arguments=env_arguments)
+    told |= {"env": env, "env_arguments": env_arguments}
+    of = find_agent(whose.agent, gamma=whose.solved_for, **told)
     names = interface.action_names
     is_renamed = are_own(names) and {*names} != {*of.action_names}  # and not in another order
     if is_own and is_renamed and len(names) == len(of.action_names):

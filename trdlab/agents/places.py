@@ -12,10 +12,12 @@ from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 
 from trdlab.agents.models import Model, World, find_model, is_model, model_of
 from trdlab.decomposition import TimeAxis
+from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments, say_arguments
 from trdlab.environments.batches import Make
 from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.interface import Interface
+from trdlab.environments.paying import PAYS, paying
 from trdlab.environments.sources import EnvSource
 from trdlab.errors import InputError
 from trdlab.rollouts.branches import Copying
@@ -160,12 +162,13 @@ def find_place(
         place = place_of(TrainSettings("atari", source, env_arg=words))
         return replace(place, env_arguments=tuple(env_arguments))
     arguments = parse_arguments(env_arguments)
+    pays = arguments.pop(PAYS, None)
 
-    def made(num_envs: int, seed: int) -> GymEnvironments:
-        return GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments)
+    def made(num_envs: int, seed: int) -> Environments:
+        return paying(GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments), pays)
 
-    called = str(env) if named else "the environment"
-    return Place(made, called, tuple(env_arguments), named, _mdp_of(env))
+    called, mdp = str(env) if named else "the environment", None if pays else _mdp_of(env)
+    return Place(made, called, tuple(env_arguments), named, mdp)
 
 
 def place_of(settings: "TrainSettings") -> Place:

@@ -85,6 +85,7 @@ def evaluated(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
     """Evaluates the agent of a run, prints the result, and says where it is kept."""
     from trdlab.atari.names import find_game
     from trdlab.cli.progress import EpisodeProgress
+    from trdlab.environments.paying import has_own_reward
     from trdlab.runs import RunFolder
     from trdlab.show.training import acts, evaluation_page, human_line
     from trdlab.training.loading import evaluate_run, run_settings
@@ -98,7 +99,8 @@ def evaluated(path: Path, as_json: bool = False, **how: Any) -> "Evaluation":
         settings = run_settings(RunFolder.open(path))
         common.print_text(evaluation_page(result, how=acts(settings)))
         mean = float(result.returns.mean())
-        if settings.kind == "atari" and (line := human_line(find_game(settings.env), mean)):
+        is_scored = settings.kind == "atari" and not has_own_reward(settings.env_arg)
+        if is_scored and (line := human_line(find_game(settings.env), mean)):
             common.print_line(line)
     common.say(errors, f"Kept: {kept}" if isinstance(kept, Path) else f"Not kept: {kept.cause}")
     return result

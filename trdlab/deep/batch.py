@@ -15,6 +15,7 @@ class Batch:
     """K windows of w steps: K the batch, k the frames in a stack.
 
     The two stacks of observations may be views of the same frames: read them, write elsewhere.
+    They are tensors where the frames lie on a device, all else are arrays.
 
     Args:
         observations: `[K, k, ...]`, the stack at s_t (`[K, ...]` where there are no stacks).
@@ -28,11 +29,11 @@ class Batch:
         extras: `[K, ...]` each, what was stored with a_t.
     """
 
-    observations: npt.NDArray[Any]
+    observations: Any
     actions: IntArray
     rewards: npt.NDArray[np.float32]
     discounts: npt.NDArray[np.float32]
-    next_observations: npt.NDArray[Any]
+    next_observations: Any
     steps: IntArray
     indices: IntArray
     extras: dict[str, npt.NDArray[Any]] = field(default_factory=dict)

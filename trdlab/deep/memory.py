@@ -53,13 +53,16 @@ def memory_needed(
     return int(frames * frame_nbytes) + num_envs * length * (TRANSITION_NBYTES + others)
 
 
-def check_memory(needed: int, capacity: int, available: int | None = None) -> None:
+def check_memory(
+    needed: int, capacity: int, available: int | None = None, of: str = "A replay memory"
+) -> None:
     """Refuses a replay memory that does not fit.
 
     Args:
         needed: its bytes, see `memory_needed`.
         capacity: its transitions.
         available: the bytes that are free; found out without it.
+        of: what needs them.
 
     Raises:
         TrdlabError: it does not fit into nine tenths of what is free.
@@ -75,7 +78,7 @@ def check_memory(needed: int, capacity: int, available: int | None = None) -> No
     fits = int(capacity * 0.9 * free / needed)
     digits = max(0, len(str(fits)) - 2)
     raise TrdlabError(
-        f"A replay memory of {capacity} transitions takes about {needed / 1e9:.2f} GB, and "
+        f"{of} of {capacity} transitions takes about {needed / 1e9:.2f} GB, and "
         f"{free / 1e9:.2f} GB is free.",
         f"Choose a capacity of at most {fits // 10**digits * 10**digits}, or free some memory.",
     )

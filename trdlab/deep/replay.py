@@ -1,7 +1,6 @@
 """The replay memory: each frame stored once, and windows of w steps read from it, any w."""
 
 from collections.abc import Mapping
-from math import prod
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -9,7 +8,8 @@ import numpy.typing as npt
 
 from trdlab.arrays import IntArray
 from trdlab.deep.batch import Batch, checked
-from trdlab.deep.frames import BLANK, FrameStore, chunk_frames, compresses
+from trdlab.deep.device_frames import frame_store
+from trdlab.deep.frames import BLANK
 from trdlab.deep.ring import RUNS, TERMINATED, TRUNCATED, Ring
 from trdlab.errors import InputError, TrdlabError, closest
 
@@ -48,6 +48,8 @@ class ReplayBuffer:
         compress: whether to compress frames; without it, images of bytes are and others are not.
         extras: shape and type of what else is stored with a transition, by name, for example
             the logits of a teacher: `{"logits": ((num_actions,), np.float32)}`.
+        device: where the frames lie, and observations are read as tensors; without it they lie in
+            the memory of the CPU, and are read as arrays.
 
     Raises:
         InputError: an option is out of its range.
@@ -77,6 +79,7 @@ class ReplayBuffer:
         time_limit: int | None = None,
         compress: bool | None = None,
         extras: Mapping[str, tuple[tuple[int, ...], npt.DTypeLike]] | None = None,
+        device: str | None = None,
     ) -> None:
         if stack is not None and stack < 1:
             raise InputError(f"The stack is {stack}.", "It must be at least 1.")
@@ -86,12 +89,14 @@ class ReplayBuffer:
         self.capacity, self.num_envs = self._ring.capacity, num_envs
         self.width, self.gamma, self.time_limit = width, float(gamma), time_limit
         self.stack, self.padding = stack, padding
-        self._frames = FrameStore(
+        self._frames = frame_store(
             shape,
-            np.dtype(dtype),
+            dtype,
             num_envs,
-            chunk_frames(self._ring.length, prod(shape) * np.dtype(dtype).itemsize),
-            compress=compresses(shape, dtype) if compress is None else compress,
+            length=self._ring.length,
+            stack=stack or 1,
+            compress=compress,
+            device=device,
         )
         self._ages = np.full(num_envs, -1, dtype=np.int64)
         # [B]: how many frames came before the newest since the reset; −1 where none runs

@@ -91,10 +91,16 @@ def memory_of(
 
 
 def _check_fits(settings: TrainSettings, environments: Environments) -> None:
+    from trdlab.deep.device_frames import device_nbytes
     from trdlab.deep.memory import check_learner, check_memory
     from trdlab.deep.networks import build_network, learner_nbytes
 
     check_memory(memory_of(settings, environments), settings.capacity)
+    if "cuda" in settings.device:
+        space, most = environments.observation_space, max(settings.capacity, settings.teacher_steps)
+        frames = device_nbytes(most, space.shape or (), np.dtype(space.dtype))
+        free = _free_on(settings.device)
+        check_memory(frames, most, free, f"On {settings.device}, a replay memory")
     network = build_network(
         observation_space(environments),
         environments.num_actions,

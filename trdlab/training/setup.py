@@ -15,6 +15,7 @@ from trdlab.deep.settings import Kind, TrainSettings, checked
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.interface import Interface
+from trdlab.environments.paying import PAYS, paying
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.files import check_small_text, free_name
@@ -174,16 +175,17 @@ def make_environments(
 
 def _made(settings: TrainSettings, num_envs: int | None, seed: int | None) -> Environments:
     arguments = parse_arguments(settings.env_arg)
+    pays = arguments.pop(PAYS, None)
     count = settings.num_envs if num_envs is None else num_envs
     seed = settings.seed if seed is None else seed
     if settings.kind == "atari":
         from trdlab.atari import AtariEnvironments, GreyAndColour
 
         made = GreyAndColour if arguments.pop("screens", False) else AtariEnvironments
-        return made(settings.env, count, seed=seed, **_for_atari(arguments))
+        return paying(made(settings.env, count, seed=seed, **_for_atari(arguments)), pays)
     from trdlab.environments import GymEnvironments
 
-    return GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments)
+    return paying(GymEnvironments(settings.env, count, seed=seed, env_arguments=arguments), pays)
 
 
 def new_trainer(

@@ -66,6 +66,15 @@ def fit_run(path: Path, **watched: Any) -> "Agent":
     return find_agent(str(path))
 
 
+def _frozen(agent: Any, env: "Where | None") -> "Agent":
+    """Returns who is fitted: of a run the network alone, without the ε of the fit that it has."""
+    if not isinstance(agent, str | Path):
+        return find(agent, env)
+    from trdlab.agents.naming import find_agent
+
+    return find_agent(str(agent), env=env, joint=True)
+
+
 def fit(
     agent: Any,
     env: "Where | None" = None,
@@ -136,7 +145,7 @@ def fit(
     from trdlab.training import fitted
     from trdlab.verbs.watching import FitWatch
 
-    frozen, chosen = find(agent, env), FitSettings(**{"seed": seed} | settings)
+    frozen, chosen = _frozen(agent, env), FitSettings(**{"seed": seed} | settings)
     policy = acting(frozen.policy or frozen.estimator)
     own = getattr(policy, "gamma", None)
     if own is None:

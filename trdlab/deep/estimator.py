@@ -1,8 +1,9 @@
 """A network as an Estimator: numpy observations in, decompositions out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -13,6 +14,7 @@ from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.deep.channels import Channels, outlook_of, reward_of, within
 from trdlab.deep.loss import acted
 from trdlab.deep.networks import DecompositionNetwork
+from trdlab.deep.saliency import gradcam, integrated_gradients, redrawn
 from trdlab.errors import InputError
 from trdlab.estimator import Future, Outlook
 
@@ -89,6 +91,77 @@ class NetworkEstimator:
         network = self.network
         return self._asked(lambda seen: network.body(network.preprocess(seen)), observations)
 
+    @torch.inference_mode(mode=False)
+    def saliency(self, observations: Any, actions: Any, *, layer: int = 0) -> FloatArray:
+        """Returns where in images each component is decided: GradCAM maps `[B, N+1, h, w]`, signed.
+
+        The map of a component is the sum of the layer's activation maps, each times the mean of the
+        component's gradient over it (see `trdlab.deep.saliency.gradcam`). It is of the expected
+        reward, before that is cut to what is `possible`.
+
+        Args:
+            observations: `[B, ...]`.
+            actions: `[B]`, the number of the action that each is asked about.
+            layer: which convolution, from 0.
+
+        Raises:
+            InputError: the network has no such convolution, there are not B actions, one does not
+                exist, or as for `decompose`.
+        """
+        seen, chosen = self._given(observations), self._chosen(actions, len(observations))
+        each = max(1, self.batch_size // self.time_axis.num_components)
+        inputs = (self.network.preprocess(of.to(self.device)) for of in torch.split(seen, each))
+        parts = [
+            gradcam(self.network, of, partial(self._row, rows), layer).cpu()
+            for of, rows in zip(inputs, torch.split(chosen, each), strict=True)
+        ]
+        maps: FloatArray = torch.cat(parts).numpy()
+        return maps
+
+    @torch.inference_mode(mode=False)
+    def attributions(self, observations: Any, actions: Any, *, baseline: Any) -> FloatArray:
+        """Returns what each entry of vectors adds to each component: `[B, N+1, F]`.
+
+        They are integrated gradients: over the entries, they add up to what is expected beyond
+        what is expected of the baseline (see `trdlab.deep.saliency.integrated_gradients`), both
+        before they are cut to what is `possible`.
+
+        Args:
+            observations: `[B, ...]`, vectors with F entries.
+            actions: `[B]`, the number of the action that each is asked about.
+            baseline: `[...]`, what they are held against, for example the mean of many.
+
+        Raises:
+            InputError: the network reads images, or the numbers of states; there are not B actions,
+                one does not exist; or as for `decompose`.
+        """
+        seen, chosen = self._given(observations), self._chosen(actions, len(observations))
+        preprocess = self.network.preprocess
+        inputs = preprocess(seen.to(self.device))  # [B, F]
+        if inputs.ndim != 2 or seen.ndim == 1:
+            whole, cure = ("images", "`saliency`") if seen.ndim > 2 else ("states", "`decompose`")
+            raise InputError(
+                f"The network reads {whole}, which have no entries of their own.", f"Use {cure}."
+            )
+        held = preprocess(self._given(np.asarray(baseline)[None]).to(self.device))[0]  # [F]
+        found = np.zeros((len(inputs), self.time_axis.num_components, held.numel()), np.float32)
+        for i, of in enumerate(inputs):
+            tell = partial(self._row, chosen[i : i + 1])
+            found[i] = integrated_gradients(self.network, of, held, tell).cpu().numpy()
+        return found
+
+    def redrawn(self, seed: int, *, layer: int | None = None) -> Self:
+        """Returns the same estimator with new weights, as before anything was learned.
+
+        Args:
+            seed: of the draw.
+            layer: of the convolution above which weights are new; by default all are.
+
+        Raises:
+            InputError: the network has no such convolution.
+        """
+        return replace(self, network=redrawn(self.network, seed, layer))
+
     def _told(self, observations: Any) -> FloatArray:
         """Returns all that the network tells: `[B, A, N+1]`, or of channels `[B, A, C, N+1]`."""
         components = self._asked(self.network, observations)  # [B, A, N+1], or [B, A·C, N+1]
@@ -102,8 +175,45 @@ class NetworkEstimator:
             else within(self.channels, components, self.possible)
         )
 
+    def _row(self, actions: Tensor, told: Tensor) -> Tensor:
+        """Returns the expected reward `[B, N+1]` of one action each `[B]`, of all that is told."""
+        rows = torch.arange(len(told), device=told.device), actions
+        if not self.channels:
+            return told[rows]
+        weights = torch.tensor([of.weight for of in self.channels], device=told.device)  # [C]
+        by_action = told.reshape(len(told), -1, len(weights), told.shape[-1])  # [B, A, C, N+1]
+        return torch.einsum("c,bck->bk", weights, by_action[rows])
+
+    def _chosen(self, actions: Any, count: int) -> Tensor:
+        """Returns the numbers of actions `[B]`, where there are as many as observations."""
+        known = self.network.num_actions // max(1, len(self.channels))
+        chosen = np.asarray(actions)
+        if chosen.shape != (count,) or (count and chosen.dtype.kind not in "iu"):
+            raise InputError(
+                f"The actions are {actions!r}, for {count} observations.",
+                "Give the number of one action for each.",
+            )
+        if count and not 0 <= chosen.min() <= chosen.max() < known:
+            wrong = chosen[(chosen < 0) | (chosen >= known)][0]
+            raise InputError(f"There is no action {wrong}.", f"They run from 0 to {known - 1}.")
+        return torch.from_numpy(chosen.astype(np.int64)).to(self.device)
+
     def _asked(self, tell: Callable[[Tensor], Tensor], observations: Any) -> FloatArray:
         """Returns what the network tells of observations `[B, ...]`, batch by batch."""
+        given, was_training = self._given(observations), self.network.training
+        self.network.eval()
+        try:
+            with torch.inference_mode():
+                parts = [
+                    tell(of.to(self.device)).cpu() for of in torch.split(given, self.batch_size)
+                ]
+        finally:
+            self.network.train(was_training)
+        told: FloatArray = torch.cat(parts).numpy()
+        return told
+
+    def _given(self, observations: Any) -> Tensor:
+        """Returns observations `[B, ...]` for the network, once they are checked."""
         array = np.array(observations)  # [B, ...], a copy that PyTorch may own
         if array.dtype.kind not in "fiub":
             raise InputError(
@@ -119,18 +229,7 @@ class NetworkEstimator:
                 f"The observations hold {array[~finite][0]}.",
                 "Give finite numbers; an environment that shows others must be corrected.",
             )
-        was_training = self.network.training
-        self.network.eval()
-        try:
-            with torch.inference_mode():
-                parts = [
-                    tell(batch.to(self.device)).cpu()  # [≤ batch_size, ...]
-                    for batch in torch.split(torch.from_numpy(array), self.batch_size)
-                ]
-        finally:
-            self.network.train(was_training)
-        told: FloatArray = torch.cat(parts).numpy()
-        return told
+        return torch.from_numpy(array)
 
 
 @dataclass(frozen=True, eq=False)

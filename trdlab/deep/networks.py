@@ -73,13 +73,13 @@ class DecompositionNetwork(nn.Module):
 
     def components(self, inputs: Tensor) -> Tensor:
         """Returns the components `[B, A, N+1]` of preprocessed inputs."""
-        return self._by_action(self.body(inputs))  # [B, ...] -> [B, F] -> [B, A, N+1]
+        return self.by_action(self.body(inputs))  # [B, ...] -> [B, F] -> [B, A, N+1]
 
     def told(self, observations: Tensor) -> tuple[Tensor, Tensor | None]:
         """Returns the components `[B, A, N+1]`, and the logits `[B, A]` of the policy head."""
         features = self.body(self.preprocess(observations))  # [B, F]
         logits = None if self.policy_head is None else self.policy_head(features)  # [B, A]
-        return self._by_action(features), logits
+        return self.by_action(features), logits
 
     def logits(self, observations: Tensor) -> Tensor:
         """Returns `[B, A]`, by which it acts: of the policy head, or else the sums of components.
@@ -96,7 +96,8 @@ class DecompositionNetwork(nn.Module):
         copy.num_actions, copy.num_components, copy.policy_head = num_actions, num_components, None
         return copy.requires_grad_(True)
 
-    def _by_action(self, features: Tensor) -> Tensor:
+    def by_action(self, features: Tensor) -> Tensor:
+        """Returns the components `[B, A, N+1]` that the head tells of features `[B, F]`."""
         flat: Tensor = self.head(features)  # [B, F] -> [B, A·(N+1)]
         return flat.reshape(len(flat), self.num_actions, self.num_components)  # [B, A, N+1]
 

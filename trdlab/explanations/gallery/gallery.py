@@ -17,7 +17,7 @@ LEVELS = (0.1, 0.3, 0.6)
 """From which share of a usual reward on a forecast is of the next level; those of one are alike."""
 MOST_GROUPS = 24
 """Of rewards; all others are told together."""
-EXAMPLES = 3
+EXAMPLES = 2
 """Rewards that are shown for a forecast."""
 
 _MOST_PAID = 0.5  # of all steps: where more pay, what changes on the screen says nothing

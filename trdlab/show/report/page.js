@@ -162,7 +162,7 @@
   })();
 
   function ticks() {
-    const span = scale.high - scale.low, rough = span / 3;
+    const span = scale.high - scale.low, rough = span / 4;
     const power = 10 ** Math.floor(Math.log10(rough));
     const unit = [1, 2, 5, 10].map((k) => k * power).find((u) => u >= rough);
     const found = [];
@@ -205,7 +205,7 @@
         if (shown !== value) { // it leaves the scale: a gap in the bar, and its number above
           canvas.append(svg("rect", { x: x - 1, y: from + 8, width: thick + 2, height: 4, fill: "var(--card)" }));
           const side = drawn.length > 1 && each < 60 ? (k ? "start" : "end") : "middle";
-          const shift = side === "middle" ? thick / 2 : k ? -2 : thick - 2;
+          const shift = side === "middle" ? thick / 2 : k ? 3 : thick - 3;
           canvas.append(svg("text", { class: "number", x: x + shift, y: from - 5, "text-anchor": side }, said(value)));
         }
       });
@@ -358,7 +358,44 @@
 
   // ---- where it looks ------------------------------------------------------------------------
 
-  function looks() {}
+  const unpacked = {};
+
+  /** Returns the levels of some steps in a row [steps, h, w, N+1], once they are unpacked. */
+  function mapsOf(chunk, then) {
+    if (unpacked[chunk]) return void unpacked[chunk].then(then);
+    const bytes = Uint8Array.from(atob(D.maps.packed[chunk]), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    unpacked[chunk] = new Response(stream).arrayBuffer().then((held) => new Int8Array(held));
+    unpacked[chunk].then(then);
+  }
+
+  /** Shows where the agent looks for a bar that somebody points at or has chosen. */
+  function looks(t, i, one) {
+    const canvas = byId("looks"), wanted = now.over !== null || now.pinned !== null;
+    const isKnown = D.maps && D.pictures && one === D.usual[t][0];
+    canvas.hidden = !(wanted && isKnown);
+    const why = !D.maps || !D.pictures ? "" : !isKnown ? "Where it looks is kept of what it does." : !wanted
+      ? "Point at a bar to see where the agent looks for it."
+      : "Yellow spots raise this bar, violet ones lower it. They show where it looks, not why.";
+    setText(byId("look-where"), why);
+    if (canvas.hidden) return;
+    const { height, width, levels, together } = D.maps, key = `${t},${i}`;
+    canvas.dataset.key = key;
+    mapsOf(Math.floor(t / together), (all) => {
+      if (canvas.dataset.key !== key) return;
+      const small = el("canvas", { width, height }), pen = small.getContext("2d");
+      const image = pen.createImageData(width, height), first = (t % together) * width * height;
+      for (let place = 0; place < width * height; place++) {
+        const level = all[(first + place) * (N + 1) + i] / levels;
+        image.data.set(level > 0 ? [255, 190, 0] : [150, 100, 255], 4 * place);
+        image.data[4 * place + 3] = 215 * Math.abs(level);
+      }
+      pen.putImageData(image, 0, 0);
+      const [, w, h] = D.pictures.sheets[D.pictures.where[D.pictures.at[t]][0]];
+      Object.assign(canvas, { width: w, height: h });
+      canvas.getContext("2d").drawImage(small, 0, 0, w, h);
+    });
+  }
 
   // ---- going about ---------------------------------------------------------------------------
 

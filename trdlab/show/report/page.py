@@ -36,7 +36,7 @@ from trdlab.show.report.told import Told
 SCHEMA = "trdlab.report/1"
 MOST_ANSWERS = 3
 """Sentences below the first ones."""
-EXAMPLES = 4
+EXAMPLES = 2
 """Rewards of a group that are shown."""
 AROUND = (-6, -3, 0, 1, 3)
 """The pictures of a reward: how many steps from the one at which it was earned."""

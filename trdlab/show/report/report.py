@@ -14,6 +14,7 @@ from trdlab.files import check_output, write_whole
 from trdlab.rollouts.episodes import distinct
 from trdlab.rollouts.playing import Watch, unwatched, usual_limit
 from trdlab.rollouts.reel import Reel
+from trdlab.show.report.maps import packed_maps
 from trdlab.show.report.page import Material, html
 from trdlab.show.report.recording import Take, record
 from trdlab.show.report.told import tell_moments
@@ -127,13 +128,16 @@ def _material(
         if len(distinct([of.episode for of in more])) < len(more):
             more.pop()  # nothing here knows chance: all others are likely the same, too
             break
+    told = tell_moments(judged.moments, agent.action_names)
+    usual = [action for action, _ in told.usual]
     return Material(
         explained=explained,
         take=judged,
         story=tell(_played(agent, take)),
-        told=tell_moments(judged.moments, agent.action_names),
+        told=told,
         gallery=gallery_of(more, reel),
         reel=reel,
+        maps=packed_maps(agent.estimator, take.observations, usual),
     )
 
 

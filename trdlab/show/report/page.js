@@ -164,7 +164,7 @@
   function ticks() {
     const span = scale.high - scale.low, rough = span / 4;
     const power = 10 ** Math.floor(Math.log10(rough));
-    const unit = [1, 2, 5, 10].map((k) => k * power).find((u) => u >= rough);
+    const unit = [1, 2, 2.5, 5, 10].map((k) => k * power).find((u) => u >= rough);
     const found = [];
     for (let k = Math.ceil(scale.low / unit); k * unit <= scale.high; k++) found.push(k * unit);
     return found;
@@ -202,7 +202,7 @@
         const pale = doubt(t, i, [a]) ? " pale" : "";
         const kind = k === 0 ? "bar-one" : "bar-other";
         canvas.append(svg("rect", { class: kind + pale, x, y: from, width: Math.max(0.8, thick - 0.6), height: Math.max(0.7, to - from) }));
-        if (shown !== value) { // it leaves the scale: a gap in the bar, and its number above
+        if (Math.abs(value - shown) > 0.04 * (scale.high - scale.low)) { // it leaves the scale: a gap in the bar, and its number above
           canvas.append(svg("rect", { x: x - 1, y: from + 8, width: thick + 2, height: 4, fill: "var(--card)" }));
           const side = drawn.length > 1 && each < 60 ? (k ? "start" : "end") : "middle";
           const shift = side === "middle" ? thick / 2 : k ? 3 : thick - 3;
@@ -333,7 +333,7 @@
   function drawLine() {
     const box = byId("line"), width = Math.max(240, box.clientWidth), height = Math.max(80, box.clientHeight);
     const top = 22, bottom = height - 18, most = Math.max(0, ...values), least = Math.min(0, ...values);
-    const x = (t) => 8 + (T === 1 ? 0 : (t / (T - 1)) * (width - 16));
+    const x = (t) => 14 + (T === 1 ? 0 : (t / (T - 1)) * (width - 28));
     const y = (v) => bottom - ((v - least) / (most - least || 1)) * (bottom - top);
     const canvas = svg("svg", { viewBox: `0 0 ${width} ${height}` });
     canvas.append(svg("line", { class: "grid", x1: 0, x2: width, y1: y(0), y2: y(0) }));
@@ -348,7 +348,7 @@
     canvas.append(svg("line", { class: "head", id: "head", x1: x(now.step), x2: x(now.step), y1: 20, y2: height }));
     box.onclick = (event) => {
       const at = (event.clientX - box.getBoundingClientRect().left) * (width / box.clientWidth);
-      go(Math.round(((at - 8) / (width - 16)) * (T - 1)));
+      go(Math.round(((at - 14) / (width - 28)) * (T - 1)));
     };
     box.replaceChildren(canvas);
     box.moveHead = () => {
@@ -464,7 +464,11 @@
     for (const box of document.querySelectorAll("[data-group]")) {
       box.append(...D.gallery.groups[box.dataset.group].map(clip));
     }
-    byId("step").addEventListener("input", () => { play(false); go(Number(byId("step").value)); });
+    byId("step").addEventListener("input", () => {
+      now.step = Number(byId("step").value);
+      play(false);
+      draw();
+    });
     byId("back").addEventListener("click", () => go(now.step - 1));
     byId("next").addEventListener("click", () => go(now.step + 1));
     byId("play").addEventListener("click", () => play(!now.timer));

@@ -5,14 +5,13 @@ from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 
-from trdlab import __version__
 from trdlab.arrays import FloatArray
 from trdlab.explanations.calibration.calibration import Calibration
 from trdlab.explanations.calibration.claims import verdicts
@@ -34,6 +33,8 @@ from trdlab.show.report.recording import Take
 from trdlab.show.report.told import Told
 
 SCHEMA = "trdlab.report/1"
+MOST_GROUPS = 6
+"""Of rewards are shown at once; the others to who asks for them."""
 MOST_ANSWERS = 3
 """Sentences below the first ones."""
 EXAMPLES = 2
@@ -77,7 +78,8 @@ def html(material: Material) -> str:
     explained, page = material.explained, document(material.explained)
     script, style = (_read(f"page.{kind}") for kind in ("js", "css"))
     lead, trusted = _lead(material), _trusted_in_short(material)
-    answer = [sentence for sentence in page.answer if sentence not in (lead, trusted)]
+    beside = (lead, trusted, *material.told.sentences_of(explained.step))
+    answer = [sentence for sentence in page.answer if sentence not in beside]
     claims = group_claims(material.gallery)
     trust = [section for section in page.sections if section.name in _TRUST]
     made = Environment(
@@ -97,17 +99,18 @@ def html(material: Material) -> str:
         start=[claim.sentence for claim in material.story.start],
         end=[claim.sentence for claim in material.story.end],
         groups=[claim.sentence for claim in claims] if material.gallery.groups else [],
+        most_groups=MOST_GROUPS,
         empty="" if material.gallery.groups else claims[0].sentence,
         trust=trust,
         untested=UNTESTED,
         details=[section for section in page.sections if section.name not in _TRUST],
         card=card(explained.agent),
-        version=__version__,
-        script=Markup(script),
-        style=Markup(style),
+        version=import_module("trdlab").__version__,  # which stands above this room
+        script=script,
+        style=style,
         script_hash=_hash(script),
         style_hash=_hash(style),
-        data=Markup(data(material).translate(_UNSAFE)),
+        data=data(material).translate(_UNSAFE),  # so that nothing in it can end it
     )
 
 

@@ -13,7 +13,8 @@ from trdlab.rollouts.reel import Picture, Reel
 MOST_PIXELS = 420  # of the longer side
 _ON_A_SHEET = 60
 _QUALITY = 80  # of what has too many colours to be kept exactly
-_COLOURS = 256
+_COLOURS = 256  # of a palette
+_DRAWN = 8_192  # colours at most of what is drawn, and kept exactly; photographs have more
 
 
 class Sheet(NamedTuple):
@@ -71,14 +72,18 @@ def _sheet(reel: Reel, numbers: Sequence[int]) -> Sheet:
 
 
 def data_uri(picture: Picture) -> str:
-    """Returns a picture `[H, W, 3]` as a data URI: exactly, if it has at most 256 colours."""
-    image, file = Image.fromarray(picture), BytesIO()
-    colours = image.getcolors(_COLOURS)
-    if colours is not None:
+    """Returns a picture `[H, W, 3]` as a data URI: exactly, unless it has very many colours."""
+    image, file, has_webp = Image.fromarray(picture), BytesIO(), features.check("webp")
+    colours = image.getcolors(_DRAWN)
+    is_drawn = colours is not None
+    if colours is not None and len(colours) <= _COLOURS:
         kind = "png"
         _with_palette(picture, np.array([of for _, of in colours])).save(file, "PNG", optimize=True)
+    elif has_webp:
+        kind = "webp"
+        image.save(file, "WEBP", lossless=is_drawn, quality=_QUALITY)
     else:
-        kind = "webp" if features.check("webp") else "jpeg"
+        kind = "png" if is_drawn else "jpeg"
         image.save(file, kind.upper(), quality=_QUALITY)
     return f"data:image/{kind};base64,{b64encode(file.getvalue()).decode()}"
 
@@ -88,6 +93,7 @@ def _with_palette(picture: Picture, colours: Picture) -> Image.Image:
     weights = np.array([1 << 16, 1 << 8, 1])
     table = np.zeros(1 << 24, dtype=np.uint8)
     table[colours @ weights] = np.arange(len(colours))
-    image = Image.fromarray(table[picture @ weights], mode="P")
+    height, width = picture.shape[:2]
+    image = Image.frombytes("P", (width, height), table[picture @ weights].tobytes())
     image.putpalette(colours.astype(np.uint8).tobytes())
     return image

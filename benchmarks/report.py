@@ -30,7 +30,7 @@ def main() -> None:
         agent, step=step, max_steps=given.steps, parts="forecast", episodes=0
     )
     with TemporaryDirectory() as folder:
-        out, begun = Path(folder) / "report.html", time.perf_counter()
+        out, begun = Path(folder) / "report.html", time.process_time()
         trdlab.report(
             agent,
             out=out,
@@ -39,11 +39,11 @@ def main() -> None:
             others=given.others,
             max_steps=given.steps,
         )
-        seconds, page = time.perf_counter() - begun, out.read_bytes()
+        seconds, page = time.process_time() - begun, out.read_bytes()
     axis = agent.estimator.time_axis
     print(
         f"{given.agent}, {given.steps:,} steps, {len(agent.action_names)} actions, "
-        f"{axis.num_components} components: {len(page) / 1e6:.1f} MB in {seconds:.0f} s"
+        f"{axis.num_components} components: {len(page) / 1e6:.1f} MB in {seconds:.0f} s of a core"
     )
     for name, piece in _pieces(page).items():
         print(f"  {name:<12} {piece / 1e6:5.2f} MB")

@@ -1,6 +1,6 @@
 """Takes the picture of a report that the documentation shows.
 
-    python docs/picture.py AGENT FILE.png [SEED]
+    python docs/picture.py AGENT FILE.png [MAX_STEPS]
 
 Writes the report of the agent, opens it in a headless Chromium, and saves what its first screen
 shows.
@@ -18,10 +18,11 @@ import trdlab
 SIZE = {"width": 1240, "height": 980}
 
 
-def main(agent: str, picture: str, seed: str = "0") -> None:
+def main(agent: str, picture: str, max_steps: str = "1000") -> None:
     """Takes the picture."""
     with TemporaryDirectory() as folder, sync_playwright() as playwright:
-        page = trdlab.report(agent, out=Path(folder) / "report.html", seed=int(seed))
+        out = Path(folder) / "report.html"
+        page = trdlab.report(agent, out=out, max_steps=int(max_steps), others=1)
         browser = playwright.chromium.launch(
             executable_path=which("chromium"), args=["--no-sandbox", "--disable-gpu"]
         )

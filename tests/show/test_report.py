@@ -13,6 +13,7 @@ import pytest
 
 import trdlab
 from browser import Visit, chromium
+from doors import Doors
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, OutputError
 from trdlab.estimator import Future
@@ -192,10 +193,66 @@ def test_numbers_are_those_of_the_json(evil, drone):
     assert held(evil)["single"]
 
 
+def test_where_it_looks_is_shown_for_the_bar_that_is_pointed_at(browser, tmp_path):
+    how = {"episodes": 0, "others": 0, "max_steps": 60}
+    out = trdlab.report("pretrained:Breakout", out=tmp_path / "b.html", **how)
+    visit = Visit(browser, out)
+    assert visit.page.locator("#looks").is_hidden()
+    assert visit.text("#look-where") == "Point at a bar to see where the agent looks for it."
+    visit.page.hover("[data-component='5']")
+    visit.page.locator("#looks").wait_for()
+    visit.page.wait_for_timeout(300)  # until the maps are unpacked
+    painted = "(c) => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((x) => x)"
+    assert visit.page.locator("#looks").evaluate(painted)
+    assert visit.page.locator("#frame").evaluate("(c) => [c.width, c.height]") == [160, 210]
+    visit.page.select_option("#action", index=1 + (held(out)["usual"][0][0] == 0))
+    visit.page.hover("[data-component='4']")
+    assert visit.text("#look-where") == "Where it looks is kept of what it does."
+    assert visit.faults == []
+
+
+@pytest.mark.parametrize("how", [{"horizon": 0}, {"horizon": 2, "width": 3, "gamma": 0.0}])
+def test_other_time_axes(browser, tmp_path, how):
+    out = trdlab.report("gridworld:bridge", out=tmp_path / "a.html", episodes=0, **how)
+    visit = Visit(browser, out)
+    for component in range(how["horizon"] + 1):
+        visit.page.hover(f"[data-component='{component}']")
+    visit.page.click("#numbers summary")
+    visit.page.locator("#table td").first.wait_for()
+    assert visit.page.locator("#table tbody tr").count() == how["horizon"] + 1
+    assert visit.faults == []
+
+
+class Flat:
+    """Expects the number of a door of going through it."""
+
+    time_axis, future = TimeAxis(0.9, 2), Future("nobody")
+
+    def decompose(self, seen: np.ndarray) -> RewardDecomposition:
+        doors = np.tile([[0.0, 0, 0], [1, 0, 0], [2, 1, 0]], (len(seen), 1, 1))
+        return RewardDecomposition(doors, self.time_axis)
+
+
+def test_actions_that_are_forbidden_have_no_bars(browser, tmp_path):
+    agent = trdlab.agent(Flat(), env=Doors)
+    visit = Visit(browser, trdlab.report(agent, out=tmp_path / "d.html", episodes=0))
+    page = held(tmp_path / "d.html")
+    closed = [(t, a) for t in range(6) for a in range(3) if page["components"][t][a][0] is None]
+    assert closed
+    for step, action in closed:
+        visit.page.fill("#step", str(step))
+        visit.page.select_option("#action", str(action))
+        assert f"{page['actions'][action]}:" not in visit.text("#legend")
+    assert visit.faults == []
+
+
 def test_an_explanation_begins_where_it_is_about(browser, tmp_path):
     explained = trdlab.explain("gridworld:ledge", step=1, episodes=12)
     out = explained.to_html(tmp_path / "ledge.html")
     assert Visit(browser, out).text("#where") == "Step 1 of 2."
+    asked = trdlab.explain("gridworld:ledge", step=1, episodes=0, action="up", foil="left")
+    visit = Visit(browser, asked.to_html(tmp_path / "asked.html"))
+    assert re.match(r"up: .* in allleft: ", visit.text("#legend"))
     with pytest.raises(OutputError, match="exists"):
         explained.to_html(out)
     explained.to_html(out, overwrite=True)

@@ -269,7 +269,8 @@
     const sure = chance === null || chance >= 0.995 ? "" : ` (chosen with ${percent(chance)})`;
     const paid = D.rewards[t] ? ` That brings a ${D.rewards[t] < 0 ? "cost" : "reward"} of ${said(Math.abs(D.rewards[t]))}.` : "";
     byId("doing").textContent = `The agent takes ${D.actions[taken]}${sure}.${paid}`;
-    const numbers = D.told[t][`${one},${other === null ? "" : other}`];
+    const name = (a, b) => `${a},${b === null ? "" : b}`; // what differs is true both ways
+    const numbers = D.told[t][name(one, other)] ?? D.told[t][name(other, one)];
     const lines = numbers ? numbers.map((i) => D.sentences[i]) : [];
     byId("says").setAttribute("aria-live", now.timer ? "off" : "polite");
     const none = other === null ? "The bars show one action alone." : "Of these two, the bars and the table tell.";
@@ -459,6 +460,10 @@
 
   function begin() {
     setUpScreen();
+    if (D.chosen) {
+      now.action = byId("action").value = String(D.chosen[0]);
+      now.foil = byId("foil").value = D.chosen[1] === null ? "none" : String(D.chosen[1]);
+    }
     drawLine();
     draw();
     for (const box of document.querySelectorAll("[data-group]")) {

@@ -150,6 +150,7 @@ def data(material: Material) -> str:
         "rewards": episode.rewards.tolist(),
         "ends": np.flatnonzero(episode.ends).tolist(),
         "usual": told.usual,
+        "chosen": _chosen(material),
         "sentences": told.sentences,
         "told": [_by_pair(each) for each in told.moments],
         "trust": None if report is None else _trusted(report.calibration),
@@ -168,6 +169,16 @@ def data(material: Material) -> str:
     told_json = json.dumps(plain_data(parts), separators=(",", ":"), allow_nan=False)
     rest = ",".join(f'"{name}":{text}' for name, text in numbers.items())
     return f"{told_json[:-1]},{rest}}}"
+
+
+def _chosen(material: Material) -> tuple[int, int | None] | None:
+    """Returns the action and the foil that the user has chosen; None where they are the usual."""
+    choice = material.explained.choice
+    if choice is None:
+        return None
+    names = material.explained.agent.action_names
+    pair = names.index(choice.action), None if choice.foil is None else names.index(choice.foil)
+    return None if pair == material.told.usual[material.explained.step] else pair
 
 
 def _of_all(rows: Sequence[Any], take: Take, explained: Explanation) -> FloatArray:

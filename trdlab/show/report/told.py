@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.telling import in_brief
 
-MOST_PAIRS = 6_000
+MOST_PAIRS = 3_000
 """Of actions and foils of which sentences are kept, in a whole episode: each takes milliseconds."""
 
 Pair = tuple[int, int | None]
@@ -35,7 +35,7 @@ class Told:
 def tell_moments(moments: Sequence[Moment], names: Sequence[str]) -> Told:
     """Returns the few sentences that matter most of each moment, for as many pairs as is quick.
 
-    What the agent does comes first, against each other action; then each other one against that.
+    They are of what the agent does: against the next best action, and then against each other one.
 
     Args:
         moments: T of them.
@@ -66,7 +66,6 @@ def _choices(choice: Choice) -> Iterator[Choice]:
     moment, done = choice.moment, choice.action
     others = [name for name in moment.action_names if name != done]
     yield from (moment.choice(done, other) for other in others if other != choice.foil)
-    yield from (moment.choice(other, done) for other in others)
 
 
 def _pair(choice: Choice, index: dict[str, int]) -> Pair:

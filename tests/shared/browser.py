@@ -19,6 +19,8 @@ _ARGUMENTS = (
     "--disable-sync",
 )
 
+_PATIENCE = 120_000  # milliseconds: other work may keep the machine busy
+
 
 @contextmanager
 def chromium() -> Iterator[Any]:
@@ -54,6 +56,7 @@ class Visit:
     def __init__(self, browser: Any, file: Path, **how: Any) -> None:
         how = {"viewport": {"width": 1280, "height": 900}} | how
         self.page = browser.new_context(**how).new_page()
+        self.page.set_default_timeout(_PATIENCE)
         self.faults: list[str] = []
         self.page.on("console", lambda message: self.faults.append(message.text))
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))

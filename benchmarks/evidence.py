@@ -66,7 +66,7 @@ def pair(agent: Agent) -> tuple[str, str]:
 
 def tally(agent: Agent, seeds: int) -> Counter[str]:
     """Returns how much was told of a table, and how much of that was false."""
-    report = assess(agent, episodes=300, copying=agent.copying)
+    report = assess(agent, episodes=300, effort=agent.effort)
     action, foil = pair(agent)
     told = Counter(
         components=sum(status != "not tested" for status in report.calibration.status),

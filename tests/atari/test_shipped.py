@@ -12,8 +12,8 @@ from trdlab.runs.pretrained import SHIPPED, pretrained_names
 GAMES = pretrained_names()
 
 
-def test_there_is_one_of_breakout():
-    assert "Breakout" in GAMES
+def test_the_games_that_the_docs_name_are_there():
+    assert {"Breakout", "Pong"} <= {*GAMES}
 
 
 @pytest.mark.parametrize("game", GAMES)

@@ -7,6 +7,7 @@ import torch
 
 from trdlab.decomposition import TimeAxis
 from trdlab.deep.networks import NatureNetwork, VectorNetwork, build_network, count_actions
+from trdlab.deep.update import load_weights
 from trdlab.errors import InputError
 
 AXIS = TimeAxis(0.99, horizon=4)
@@ -53,6 +54,23 @@ def test_the_head_is_action_by_action():
         network.head.weight.zero_()
         network.head.bias.copy_(torch.arange(6.0))
     assert network(torch.zeros(1, 3, 2)).tolist() == [[[0, 1, 2], [3, 4, 5]]]
+
+
+def test_the_mean_of_images_is_taken_away():
+    network, rng = build_network(ATARI, 2, AXIS), np.random.default_rng(0)
+    seen = rng.integers(0, 256, (50, 4, 84, 84), dtype=np.uint8)
+    network.standardise(seen)
+    inputs = network.preprocess(torch.as_tensor(seen))
+    torch.testing.assert_close(inputs.mean(dim=0), torch.zeros(4, 84, 84), atol=1e-5, rtol=0)
+    torch.testing.assert_close(inputs[3] + network.middle, torch.as_tensor(seen[3]) / 255.0)
+
+
+def test_weights_of_images_that_know_no_mean_are_read_as_they_were_learned():
+    network, older = build_network(ATARI, 2, AXIS, seed=1), build_network(ATARI, 2, AXIS, seed=2)
+    network.standardise(np.full((2, 4, 84, 84), 9, dtype=np.uint8))
+    load_weights(network, {k: v for k, v in older.state_dict().items() if k != "middle"})
+    white = torch.full((1, 4, 84, 84), 255, dtype=torch.uint8)
+    assert torch.equal(network(white), older(white))
 
 
 def test_images_and_bytes_reach_from_0_to_1():

@@ -217,19 +217,59 @@ def test_a_loss_that_is_not_finite_changes_nothing():
     assert run.num_updates == 1
 
 
-def test_a_resumed_learner_is_the_uninterrupted_one_to_the_bit():
-    whole, first = learner(target_sync_updates=4), learner(target_sync_updates=4)
+def test_the_agent_is_the_mean_of_the_networks_so_far():
+    run, weighed = learner(averaging=0.15), [0.1, 0.15, 0.15]  # 1/10, then no more than 0.15
+    mean = weights(run.q_network)
+    assert torch.equal(weights(run.agent), mean)
+    for seed, past in enumerate(weighed):
+        run.update(random_batch(seed))
+        mean = past * mean + (1 - past) * weights(run.q_network)
+        torch.testing.assert_close(weights(run.agent), mean)
+    assert not any(weight.requires_grad for weight in run.agent.parameters())
+
+
+def dots(count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Bright screens `[B, 1, 36, 36]` with one dark dot, and whether that is to the right."""
+    images, right = np.full((count, 1, 36, 36), 200, dtype=np.uint8), rng.integers(0, 2, count)
+    images[np.arange(count), 0, rng.integers(4, 32, count), np.where(right, 28, 8)] = 100
+    return images, right
+
+
+@pytest.mark.parametrize("standardised", [False, True])
+def test_what_moves_on_a_bright_screen_is_learned_once_the_rest_is_taken_away(standardised):
+    """A teacher says with 90 % on which side the dot is; who knows nothing is 0.37 away from it."""
+    space, rng = gym.spaces.Box(0, 255, (1, 36, 36), np.uint8), np.random.default_rng(0)
+    run = Learner(
+        build_network(space, 2, TimeAxis(0.9, 1), policy_head=True),
+        UpdateSettings(learning_rate=1e-3),
+    )
+    if standardised:
+        run.standardise(dots(200, rng)[0])
+    for _ in range(140):
+        images, right = dots(32, rng)
+        batch = Batch(images, right, np.zeros(32), np.zeros(32), images)
+        taught = np.eye(2, dtype=np.float32)[right] * 0.8 + 0.1
+        apart = run.update(batch, taught=taught, distillation=1.0).distance
+    assert apart < 0.05 if standardised else apart > 0.3
+
+
+@pytest.mark.parametrize("averaging", [0.0, 0.9])
+def test_a_resumed_learner_is_the_uninterrupted_one_to_the_bit(averaging):
+    told = {"target_sync_updates": 4, "averaging": averaging}
+    whole, first = learner(**told), learner(**told)
     for seed in range(6):
         whole.update(random_batch(seed))
         first.update(random_batch(seed))
-    second = learner(target_sync_updates=4, seed=9)
+    second = learner(seed=9, **told)
     second.load_state_dict(first.state_dict())
     for seed in range(6, 12):
         whole.update(random_batch(seed))
         second.update(random_batch(seed))
     assert second.num_updates == 12
-    assert torch.equal(weights(whole.q_network), weights(second.q_network))
-    assert torch.equal(weights(whole.target_network), weights(second.target_network))
+    for of in ("q_network", "target_network", "agent"):
+        assert torch.equal(weights(getattr(whole, of)), weights(getattr(second, of)))
+    apart = not torch.equal(weights(second.agent), weights(second.q_network))
+    assert apart == bool(averaging)
 
 
 def test_other_settings_are_not_resumed():

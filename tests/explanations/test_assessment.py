@@ -23,7 +23,7 @@ from trdlab.explanations.calibration.faults import faults
 from trdlab.explanations.moment.moment import CHOICES, Choice
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.policies import Memoryless
-from trdlab.rollouts import Copying, collect
+from trdlab.rollouts import Effort, collect
 from trdlab.tabular import MDP, ExactTable, ModelEnvironments, exact
 
 AXIS = TimeAxis(0.95, 4)
@@ -36,7 +36,7 @@ def slippery(tmp_path: Path, slip: float) -> str:
 
 
 def test_an_exact_table_is_trusted_over_its_whole_horizon():
-    report = assess(gridworld_agent("ledge", AXIS), episodes=300, copying=Copying())
+    report = assess(gridworld_agent("ledge", AXIS), episodes=300, effort=Effort())
     assert report.trust.is_whole
     assert report.judged.epsilon == 0.0
     assert report.errors is not None
@@ -49,7 +49,7 @@ def test_an_exact_table_is_trusted_over_its_whole_horizon():
 
 
 def test_where_all_episodes_are_the_same_some_actions_are_random():
-    report = assess(gridworld_agent("drone", AXIS), episodes=60, copying=Copying())
+    report = assess(gridworld_agent("drone", AXIS), episodes=60, effort=Effort())
     assert (report.judged.epsilon, report.score.epsilon) == (1.0 / 6.0, 0.0)
     assert (report.score.different, report.score.returns.value) == (1, 4.0)
     assert report.trust.is_whole
@@ -75,7 +75,7 @@ def test_one_episode_does_not_tell_that_all_are_the_same(name):
 
 
 def test_copies_that_were_not_followed_do_not_tell_that_there_is_no_chance():
-    report = assess(gridworld_agent("ledge", TimeAxis(0.95, 0)), episodes=20, copying=Copying())
+    report = assess(gridworld_agent("ledge", TimeAxis(0.95, 0)), episodes=20, effort=Effort())
     assert report.ceiling is not None
     assert not report.ceiling.deterministic
 
@@ -168,7 +168,7 @@ def test_there_is_a_ceiling_only_where_states_can_be_copied(copyable, monkeypatc
         return GymEnvironments("Once-v0", num_envs, seed=seed, env_arguments=made)
 
     agent = Agent("once", drone.estimator, ("wait", "take", "a", "b"), make)
-    report = assess(agent, episodes=12, epsilon=0.0, copying=Copying(episodes=2))
+    report = assess(agent, episodes=12, epsilon=0.0, effort=Effort(episodes=2))
     assert (report.ceiling is not None) == (report.foils is not None) == copyable
     assert report.lost == "" if copyable else "Once-v0 cannot be copied: " in report.lost
 
@@ -192,7 +192,7 @@ def test_copies_that_share_their_chance_do_not_tell_that_all_can_be_known():
     axis = TimeAxis(0.95, 2, 2)  # of two steps in one no episode tells that each is a toss
     halves = Given(np.full((12, 4, 3), 0.5), axis, Future("any policy"))
     agent = trdlab.agent(halves, env=Tossed)
-    report = assess(agent, episodes=40, copying=Copying())
+    report = assess(agent, episodes=40, effort=Effort())
     assert report.ceiling is not None
     assert report.ceiling.deterministic
     assert report.chance
@@ -215,7 +215,7 @@ def test_moments_are_found_in_short_episodes_beside_a_few_that_never_end(seed):
         return ModelEnvironments(mdp, num_envs, seed=seed)
 
     agent = Agent("short", exact(mdp, AXIS), ("wait",), make)
-    report = assess(agent, episodes=60, max_steps=400, copying=Copying(episodes=2), seed=seed)
+    report = assess(agent, episodes=60, max_steps=400, effort=Effort(episodes=2), seed=seed)
     assert report.ceiling is not None
     assert report.ceiling.num_moments >= 2
     assert report.judged.truncated > 0

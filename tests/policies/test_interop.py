@@ -28,7 +28,7 @@ from trdlab.policies import Likeliest, ask  # noqa: E402
 from trdlab.policies.files import Options  # noqa: E402
 from trdlab.policies.live import adapt as adapt_live  # noqa: E402
 from trdlab.policies.registry import read_policy  # noqa: E402
-from trdlab.rollouts.branches import Copying  # noqa: E402
+from trdlab.rollouts.branches import Effort  # noqa: E402
 
 
 class Seen(gym.Env):
@@ -340,9 +340,9 @@ def quick(monkeypatch) -> None:
     monkeypatch.setitem(trdlab.fit.__kwdefaults__, "seconds", 1.0)
     for module in (assessment, explaining):
         monkeypatch.setattr(module, "usual_episodes", lambda agent: 4)
-    few = Copying(episodes=2, moments=1, copies=2, tries=2)
+    few = Effort(episodes=2, moments=1, copies=2, tries=2)
     made = given.acting_agent
-    monkeypatch.setattr(given, "acting_agent", lambda *what: replace(made(*what), copying=few))
+    monkeypatch.setattr(given, "acting_agent", lambda *what: replace(made(*what), effort=few))
 
 
 def test_the_lines_of_the_guide_run_as_they_stand(quick, tmp_path, monkeypatch):

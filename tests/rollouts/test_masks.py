@@ -15,7 +15,7 @@ from trdlab.explanations import moment_at
 from trdlab.explanations.assessment import assess
 from trdlab.policies import EpsilonGreedy, Likeliest, Memoryless, ask
 from trdlab.policies.adapted import About, Valuing
-from trdlab.rollouts.branches import Branching, Copying
+from trdlab.rollouts.branches import Branching, Effort
 from trdlab.rollouts.playing import Playing, any_actions
 
 RNG = np.random.default_rng
@@ -114,7 +114,7 @@ def test_nobody_goes_through_a_closed_door(policy, how):  # which raises an erro
     assert keen.evaluate(20).mean.value > 4
     episodes = keen.play(10, seed=3, epsilon=0.5)
     assert {len(episode) for episode in episodes} == {LENGTH}
-    report = assess(keen, episodes=20, copying=Copying(10, 3, 4), seed=5)
+    report = assess(keen, episodes=20, effort=Effort(10, 3, 4), seed=5)
     assert report.foils is not None
     assert not report.lost
 

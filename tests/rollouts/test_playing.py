@@ -56,7 +56,7 @@ def test_episodes_last_four_horizons_at_least():
 def test_it_is_told_how_far_episodes_are():
     heard: list[Progress] = []
     agent = gridworld_agent("ledge,slip=0.3", AXIS)
-    assess(agent, episodes=12, copying=agent.copying, watch=heard.append)
+    assess(agent, episodes=12, effort=agent.effort, watch=heard.append)
     assert list(dict.fromkeys(progress.what for progress in heard)) == [
         "episodes to judge by",
         "episodes with copies",

@@ -39,8 +39,8 @@ def try_out(
     report: CalibrationReport | None = None,
 ) -> Trial | None:
     """What comes of two actions at the first step of an episode, each tried from so many copies."""
-    tries = copies or agent.copying.tries
-    known = replace(agent, copying=replace(agent.copying, tries=tries))
+    tries = copies or agent.effort.tries
+    known = replace(agent, effort=replace(agent.effort, tries=tries))
     asked: Any = {"report": report} if report is not None else {"episodes": 0}
     return explain(known, ("contrast",), seed=seed, action=action, foil=foil, **asked).trial
 

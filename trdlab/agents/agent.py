@@ -17,7 +17,7 @@ from trdlab.environments.interface import Interface
 from trdlab.errors import InputError
 from trdlab.estimator import Estimator, Unfitted
 from trdlab.policies import Likeliest, Policy, acting, ask
-from trdlab.rollouts.branches import Copying
+from trdlab.rollouts.branches import Effort
 from trdlab.rollouts.episodes import Episode, Recording, collect
 from trdlab.rollouts.evaluation import Evaluation, score
 from trdlab.rollouts.playing import Watch, part_of, unwatched
@@ -37,7 +37,7 @@ class Agent:
         is_away: whether it acts elsewhere than in that model, so that nothing is certain there.
         seconds_per_step: how long one of its steps takes as people play, if that is known.
         origin: how a user has named it, and where it acts; None if it was given as an object.
-        copying: how much is copied of its states, where nothing else is said.
+        effort: how much is played and copied to judge it, where nothing else is said.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Agent:
     is_away: bool = False
     seconds_per_step: float | None = None
     origin: Origin | None = None
-    copying: Copying = Copying()  # noqa: RUF009  it is frozen
+    effort: Effort = Effort()  # noqa: RUF009  it is frozen
 
     def __repr__(self) -> str:
         told = "not fitted"

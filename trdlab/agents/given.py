@@ -21,7 +21,7 @@ from trdlab.policies import Memoryless, Policy, ask
 from trdlab.policies.adapted import About, games_for, sees_screens
 from trdlab.policies.functions import as_they_are, from_function
 from trdlab.policies.registry import policy_of
-from trdlab.rollouts.branches import Copying
+from trdlab.rollouts.branches import Effort
 from trdlab.rollouts.playing import shown
 from trdlab.tabular import ExactTable, exact
 from trdlab.time_axis import TimeAxis
@@ -110,7 +110,7 @@ def model_agent(
         policy=Memoryless(lambda states: policy[states]),
         world=world,
         is_away=not place.is_model(solved.mdp),
-        copying=Copying(judged=300, episodes=100),  # of an exact table they are cheap
+        effort=Effort(judged=300, episodes=100),  # of an exact table they are cheap
     )
 
 
@@ -138,7 +138,7 @@ def acting_agent(who: Estimator | Policy | Callable[[Any], Any], place: Place, n
         action_names=found.action_names,
         make=place.make,
         seconds_per_step=found.seconds_per_step,
-        copying=place.copying,
+        effort=place.effort,
     )
     about = getattr(who, "about", None)
     if isinstance(about, About):

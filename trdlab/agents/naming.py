@@ -147,7 +147,7 @@ def _run(name: str, env: Where | None, env_arguments: Sequence[str], *, joint: b
         policy=estimator if isinstance(estimator, Policy) else None,
         seconds_per_step=found.seconds_per_step,
         origin=place.origin(called, None, away=env is not None, module=module),
-        copying=place.copying,
+        effort=place.effort,
     )
     own = None if joint else own_fit(path, step)
     return agent if own is None else _with_fit(agent, *load_fit(own)[::2])

@@ -20,14 +20,14 @@ from trdlab.environments.interface import Interface
 from trdlab.environments.paying import PAYS, paying
 from trdlab.environments.sources import EnvSource
 from trdlab.errors import InputError
-from trdlab.rollouts.branches import Copying
+from trdlab.rollouts.branches import Effort
 from trdlab.tabular import MDP
 
 if TYPE_CHECKING:
     from trdlab.deep.settings import TrainSettings
 
 # a game is long, and a copy plays all of it again
-_OF_GAMES = Copying(judged=16, episodes=12, moments=2, copies=2, tries=10, unasked=False)
+_OF_GAMES = Effort(judged=16, episodes=12, moments=2, copies=2, tries=10, unasked=False)
 
 Where = EnvSource | Model | World | MDP
 """What says where an agent acts."""
@@ -99,7 +99,7 @@ class Place:
         env_arguments: what it is made with, as `KEY=VALUE`.
         is_named: whether it can be found again by its name.
         mdp: the model that it is; None where it carries none.
-        copying: how much is copied of states there.
+        effort: how much is played and copied there to judge who acts.
     """
 
     make: Make
@@ -107,7 +107,7 @@ class Place:
     env_arguments: tuple[str, ...] = ()
     is_named: bool = True
     mdp: MDP | None = None
-    copying: Copying = Copying()  # noqa: RUF009  it is frozen
+    effort: Effort = Effort()  # noqa: RUF009  it is frozen
 
     def is_model(self, mdp: MDP) -> bool:
         """Returns whether episodes here go as a model says."""
@@ -175,9 +175,9 @@ def place_of(settings: "TrainSettings") -> Place:
     """Returns where the agent of a run acts."""
     from trdlab.training.setup import make_environments
 
-    copying = _OF_GAMES if settings.kind == "atari" else Copying()
+    effort = _OF_GAMES if settings.kind == "atari" else Effort()
     make = partial(make_environments, settings)
-    return Place(make, settings.env, settings.env_arg, copying=copying)
+    return Place(make, settings.env, settings.env_arg, effort=effort)
 
 
 def _is_game(env: str) -> bool:

@@ -20,7 +20,7 @@ from trdlab.deep.estimator import NetworkEstimator
 from trdlab.deep.experience import FAR, Ahead, Experience
 from trdlab.deep.fit_settings import FitProgress, FitSettings
 from trdlab.deep.loss import finite_loss
-from trdlab.deep.networks import DecompositionNetwork, VectorNetwork, build_network
+from trdlab.deep.networks import DecompositionNetwork, build_network
 from trdlab.deep.update import arrays_of, load_moments, load_weights, moments_of
 from trdlab.errors import InputError
 from trdlab.estimator import Future
@@ -31,6 +31,7 @@ _BETWEEN = 10  # updates between two networks of which the mean is taken
 _FALLS = 3  # times that the learning rate falls before learning stops
 _FALL = 0.3  # what is left of it each time
 _NOTHING = 1e-3  # of what came: where it varies by less, there is nothing to predict
+_SEEN = 2_000  # observations of which the mean and the deviation are taken
 _CHUNK = 4096  # rows that a network is asked about at once
 _LAG = 1e-2  # of what is expected: so much the target network may lag behind before it counts
 
@@ -100,8 +101,9 @@ class Fit:
         ends = np.array([np.minimum(paid.min(axis=0), 0.0), np.maximum(paid.max(axis=0), 0.0)])
         most = np.append(np.ones(axis.horizon), 1.0 / (1.0 - axis.gamma**axis.width))
         self.possible = ends[..., None] * (axis.discounts * most)  # [2, C, N+1]
-        if copied is None and isinstance(new, VectorNetwork) and new.num_states is None:
-            new.standardise(experience.frames[self._learned], alike=alike)
+        if copied is None:
+            some = self._learned[:: max(1, len(self._learned) // _SEEN)]
+            new.standardise(experience.seen(some), alike=alike)
         self.target_network = deepcopy(self.network)
         self._mean = AveragedModel(self.network)  # of the networks since learning became slower
         self.optimizer = torch.optim.Adam(

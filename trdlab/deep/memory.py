@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from math import prod
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,9 @@ import numpy.typing as npt
 from trdlab.deep.frames import chunk_frames, compresses
 from trdlab.deep.ring import TRANSITION_NBYTES
 from trdlab.errors import TrdlabError
+
+if TYPE_CHECKING:
+    from trdlab.deep.networks import DecompositionNetwork
 
 COMPRESSED = 0.23
 """The part of an 84×84 Atari frame that compression leaves in an unfavourable game (measured by
@@ -84,11 +88,36 @@ def check_memory(
     )
 
 
+def learner_nbytes(network: "DecompositionNetwork", batch_size: int) -> int:
+    """Returns the bytes that learning with a network takes, roughly: those that grow with it.
+
+    Five numbers for each weight (online, target, gradient and Adam's two), and four for what each
+    layer makes of each window of a batch.
+
+    Args:
+        network: as `build_network` returns it; with or without weights.
+        batch_size: the windows in a batch.
+
+    >>> import gymnasium as gym
+    >>> from trdlab.decomposition import TimeAxis
+    >>> from trdlab.deep.networks import build_network
+    >>> space = gym.spaces.Box(-1, 1, (4,))
+    >>> network = build_network(space, 2, TimeAxis(0.99, 9), hidden=[100], seed=None)
+    >>> learner_nbytes(network, 10)  # 4·(5·2520 + 10·4·(4 + 100 + 20))
+    70240
+    """
+    weights = sum(weight.numel() for weight in network.parameters())
+    made: int = prod(network.observation_shape)
+    for layer in network.modules():
+        made += getattr(layer, "out_features", 0)
+    return 4 * (5 * weights + 4 * batch_size * made)
+
+
 def check_learner(needed: int, available: int | None) -> None:
     """Refuses a network that does not fit, with the batch that it is to learn from.
 
     Args:
-        needed: its bytes, see `trdlab.deep.networks.learner_nbytes`.
+        needed: its bytes, see `learner_nbytes`.
         available: the bytes that are free; None if unknown.
 
     Raises:

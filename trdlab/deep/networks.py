@@ -71,6 +71,15 @@ class DecompositionNetwork(nn.Module):
         """Returns observations `[B, ...]` as the floating-point inputs of the first layer."""
         raise NotImplementedError
 
+    def standardise(self, seen: NDArray[Any], *, alike: bool = False) -> None:
+        """Makes inputs like these `[M, ...]` easy to learn from, as far as that makes sense.
+
+        Args:
+            seen: the observations.
+            alike: whether all numbers of vectors are of one unit: then one that hardly ever moves
+                is not blown up.
+        """
+
     def components(self, inputs: Tensor) -> Tensor:
         """Returns the components `[B, A, N+1]` of preprocessed inputs."""
         return self.by_action(self.body(inputs))  # [B, ...] -> [B, F] -> [B, A, N+1]
@@ -123,6 +132,8 @@ class NatureNetwork(DecompositionNetwork):
     Source: Mnih et al. (2015), extended data table 1; head as in the paper, section 4.
     """
 
+    middle: Tensor  # [C, H, W], what is taken away from images; saved with the weights
+
     def __init__(
         self,
         observation_shape: tuple[int, int, int],
@@ -144,9 +155,19 @@ class NatureNetwork(DecompositionNetwork):
         super().__init__(body, head, observation_shape, num_actions, num_components)
         self.memory_format = torch.channels_last if channels_last else torch.contiguous_format
         self.to(memory_format=self.memory_format)  # type: ignore[call-overload]
+        middle = torch.zeros((height, width, observation_shape[0]), device=self.head.weight.device)
+        self.register_buffer("middle", middle.permute(2, 0, 1))  # in the same layout
+
+    def standardise(self, seen: NDArray[Any], *, alike: bool = False) -> None:
+        """Has the mean of images like these `[M, C, H, W]` taken away from each.
+
+        What never changes on a screen is most of it, and teaches nothing. Where it is bright,
+        little else is learned for long: of Pong, nothing at all in thousands of updates.
+        """
+        self.middle.copy_(torch.as_tensor(seen).float().mean(dim=0) / 255.0)
 
     def preprocess(self, observations: Tensor) -> Tensor:
-        """Returns `[B, C, H, W]`, from 0 to 1."""
+        """Returns `[B, C, H, W]`, from 0 to 1, less the mean image if that is known."""
         self._check_shape(observations)
         if observations.dtype != torch.uint8:
             raise InputError(
@@ -154,7 +175,7 @@ class NatureNetwork(DecompositionNetwork):
                 "Give uint8 from 0 to 255: the network divides by 255 itself.",
             )
         pixels = observations.contiguous(memory_format=self.memory_format)  # [B, C, H, W]
-        return pixels.float().div_(255.0)  # [B, C, H, W]
+        return pixels.float().div_(255.0).sub_(self.middle)  # [B, C, H, W]
 
 
 class VectorNetwork(DecompositionNetwork):
@@ -204,12 +225,9 @@ class VectorNetwork(DecompositionNetwork):
         self.register_buffer("scale", torch.as_tensor(scale, dtype=torch.float32))
 
     def standardise(self, seen: NDArray[Any], *, alike: bool = False) -> None:
-        """Makes inputs like these `[M, ...]` have mean 0 and deviation 1.
-
-        Args:
-            seen: the inputs.
-            alike: whether all are of one unit: then one that hardly ever moves is not blown up.
-        """
+        """Makes inputs like these `[M, ...]` have mean 0 and deviation 1; not those of states."""
+        if self.num_states is not None:
+            return
         inputs = seen.reshape(len(seen), -1).astype(np.float64)  # [M, F]
         spread = inputs.std(axis=0)
         if alike:
@@ -308,28 +326,6 @@ def _plain(
     low, high = observation_space.low, observation_space.high
     bounds = low.astype(np.float64).ravel(), high.astype(np.float64).ravel()
     return VectorNetwork(shape, *outputs, hidden=hidden, rng=rng, bounds=bounds)
-
-
-def learner_nbytes(network: DecompositionNetwork, batch_size: int) -> int:
-    """Returns the bytes that learning with a network takes, roughly: those that grow with it.
-
-    Five numbers for each weight (online, target, gradient and Adam's two), and four for what each
-    layer makes of each window of a batch.
-
-    Args:
-        network: as `build_network` returns it; with or without weights.
-        batch_size: the windows in a batch.
-
-    >>> space = gym.spaces.Box(-1, 1, (4,))
-    >>> network = build_network(space, 2, TimeAxis(0.99, 9), hidden=[100], seed=None)
-    >>> learner_nbytes(network, 10)  # 4·(5·2520 + 10·4·(4 + 100 + 20))
-    70240
-    """
-    weights = sum(weight.numel() for weight in network.parameters())
-    made = math.prod(network.observation_shape)
-    for layer in network.modules():
-        made += getattr(layer, "out_features", 0)
-    return 4 * (5 * weights + 4 * batch_size * made)
 
 
 def count_actions(action_space: gym.Space[Any]) -> int:

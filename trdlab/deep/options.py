@@ -1,9 +1,10 @@
 """Fields that are options: of which kind and in which range their values are, said once."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, field
 from typing import Any
 
-from trdlab.errors import InputError
+from trdlab.errors import InputError, closest
 
 _LARGE = 2**63 - 1  # what a file, and a computer, can hold of a whole number
 _SINGULAR = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
@@ -56,7 +57,30 @@ def check_range(of: Field[Any], value: Any) -> None:
             )
 
 
-def typed(value: Any, kind: type, listed: bool, key: str, where: str) -> Any:
+def key_of(of: Field[Any]) -> str:
+    """Returns what an option is called in a configuration."""
+    return str(of.metadata.get("key") or of.name)
+
+
+def given_options(
+    options: Sequence[Field[Any]], config: Mapping[str, Any], where: str
+) -> dict[str, Any]:
+    """Returns the values of options, by the names of their fields, from lines of a configuration.
+
+    Raises:
+        InputError: a key is unknown, or a value has another type.
+    """
+    known, given = {key_of(of): of for of in options}, {}
+    for key, value in config.items():
+        if key not in known:
+            raise InputError(f"{where} has an unknown key '{key}'.", closest(key, known))
+        of = known[key]
+        listed = isinstance(of.default, tuple)
+        given[of.name] = _typed(value, of.metadata.get("kind", str), listed, key, where)
+    return given
+
+
+def _typed(value: Any, kind: type, listed: bool, key: str, where: str) -> Any:
     """Returns a value of a configuration as the type of the option."""
     values = value if listed and isinstance(value, list | tuple) else [value]
     if isinstance(value, list | tuple) != listed or not all(_fits(of, kind) for of in values):

@@ -165,6 +165,8 @@ _TAUGHT: dict[str, Config] = {
         "offline_updates": 10_000,  # three times each step: with more, it learns them by heart
         "learning_rate": 7e-4,  # what a teacher does stays the same, and may be learned fast
         "learning_rate_end": 1e-5,
+        "standardise": True,  # of a bright screen nothing would be learned for long
+        "averaging": 0.998,
     }
 }
 """By preset: what else is other where there is a teacher."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, Self, get_args
 
 from trdlab.decomposition import TimeAxis
-from trdlab.deep.options import check_range, option, typed
+from trdlab.deep.options import check_range, given_options, key_of, option
 from trdlab.deep.update_settings import Precision as Precision
 from trdlab.deep.update_settings import UpdateSettings as UpdateSettings
-from trdlab.errors import InputError, closest
+from trdlab.errors import InputError
 
 Kind = Literal["gym", "atari"]
 Distil = Literal["auto", "values", "policy"]
@@ -100,6 +100,14 @@ class TrainSettings:
         "Cut longer gradients to this length; without it, they are left.",
         "Learning",
         kind=float,
+    )
+    averaging: float = option(
+        0.0, "Weight of past networks in a mean that acts; 0: the newest acts.", "Learning", least=0
+    )
+    standardise: bool = option(
+        False,
+        "By what was seen before the first update: images less their mean, vectors scaled, too.",
+        "Learning",
     )
     double: bool = option(
         False, "Double DQN: the online network chooses; not with a policy head.", "Learning"
@@ -293,7 +301,7 @@ class TrainSettings:
 
     def to_config(self) -> dict[str, Any]:
         """Returns the lines of a configuration file, in the order of the options."""
-        config = {key: getattr(self, name) for key, name in _names().items()}
+        config = {key_of(of): getattr(self, of.name) for of in fields(self)}
         if self.teacher is None:  # the rest would mean nothing
             idle = {of.name for of in fields(self) if of.metadata.get("panel") == TEACHING}
             config = {key: value for key, value in config.items() if key not in idle}
@@ -330,19 +338,7 @@ def checked(config: Mapping[str, Any], where: str) -> dict[str, Any]:
     Raises:
         InputError: a key is unknown, or a value has another type.
     """
-    names, options = _names(), {of.name: of for of in fields(TrainSettings)}
-    given = {}
-    for key, value in config.items():
-        if key not in names:
-            raise InputError(f"{where} has an unknown key '{key}'.", closest(key, names))
-        of = options[names[key]]
-        listed = isinstance(of.default, tuple)
-        given[of.name] = typed(value, of.metadata.get("kind", str), listed, key, where)
+    given = given_options(fields(TrainSettings), config, where)
     if given.get("kind", "gym") not in get_args(Kind):
         raise InputError(f"{where} has kind = '{given['kind']}'.", "Use 'gym' or 'atari'.")
     return given
-
-
-def _names() -> dict[str, str]:
-    """Returns the name of the field of each key of a configuration."""
-    return {f.metadata.get("key") or f.name: f.name for f in fields(TrainSettings)}

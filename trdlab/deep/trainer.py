@@ -21,13 +21,15 @@ from trdlab.deep.networks import build_network
 from trdlab.deep.replay import ReplayBuffer
 from trdlab.deep.scores import Scores
 from trdlab.deep.settings import TrainSettings
-from trdlab.deep.update import Learner, load_weights
+from trdlab.deep.update import Learner
 from trdlab.environments import Environments, NotReproducible, Step
 from trdlab.environments.faults import blamed, check_finite
 from trdlab.environments.protocol import Frames
 from trdlab.environments.stack import FrameStack, observation_space
 from trdlab.policies.teacher import Lesson, Teacher
 from trdlab.rollouts.playing import drawn
+
+_SEEN = 1_000  # observations by which others are standardised
 
 
 class Trainer:
@@ -103,8 +105,7 @@ class Trainer:
         Raises:
             InputError: they are those of another network.
         """
-        load_weights(self.learner.q_network, weights)
-        self.learner.sync_target()
+        self.learner.begin_with(weights)
 
     def step(self) -> None:
         """Acts once in every environment, remembers it, and makes the updates that are due.
@@ -199,6 +200,7 @@ class Trainer:
             padding=of.padding,
             time_limit=of.time_limit,
             extras=extras,
+            device=settings.device if "cuda" in settings.device else None,
         )
 
     def _reset(self) -> Frames:
@@ -222,7 +224,7 @@ class Trainer:
     def _own(self) -> IntArray:
         """Returns what the network does `[B]`."""
         observations = torch.from_numpy(self.stack.observations).to(self.learner.device)
-        logits = self.learner.q_network.logits(observations)  # [B, A]
+        logits = self.learner.agent.logits(observations)  # [B, A]
         if not self.settings.draw:
             return np.asarray(logits.argmax(dim=1).cpu().numpy())  # [B]
         likely = acted(logits, draw=True).cpu().numpy()  # [B, A]
@@ -252,6 +254,9 @@ class Trainer:
             self._update()
 
     def _update(self) -> None:
+        if self.settings.standardise and not self.learner.num_updates:
+            seen = self.memory.sample(_SEEN, np.random.default_rng(self.settings.seed))
+            self.learner.standardise(seen.observations)
         batch = self.memory.sample(self.settings.batch_size, self.rng)
         taught, of = batch.extras.get(TAUGHT), self.lessons
         weight = of.weight(self.scores.mean_return) if of else 0.0

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from trdlab.deep.loss import acted, distillation_loss, finite_loss, of_actions, td_loss, trd_target
-from trdlab.deep.networks import DecompositionNetwork
+from trdlab.deep.networks import DecompositionNetwork, NatureNetwork
 from trdlab.deep.update_settings import UpdateSettings
 from trdlab.errors import InputError
 
@@ -65,7 +65,11 @@ class Metrics(NamedTuple):
 
 
 class Learner:
-    """A network that learns, its target network, and the optimiser.
+    """A network that learns, its target network, the optimiser, and the agent that comes of it.
+
+    With `averaging` the agent is the mean of all networks so far, which errs less than each of
+    them: θ̄ ← b θ̄ + (1 − b) θ after every update, where b rises to `averaging` (Polyak & Juditsky,
+    1992, with weights that fall as in most of today's practice).
 
     Args:
         q_network: what learns; moved to `device`.
@@ -90,6 +94,9 @@ class Learner:
             lr=self.settings.learning_rate,
             fused=self.device.type in ("cpu", "cuda"),
         )
+        self.agent = self.q_network
+        if self.settings.averaging:
+            self.agent = deepcopy(self.q_network).requires_grad_(False)
         self.num_updates = 0
 
     def update(self, batch: Windows, *, taught: Any = None, distillation: float = 0.0) -> Metrics:
@@ -123,6 +130,7 @@ class Learner:
         self.optimizer.step()
 
         self.num_updates += 1
+        self._average()
         if self.num_updates % settings.target_sync_updates == 0:
             self.sync_target()
         values = of_actions(components.detach(), actions).sum(dim=1)  # [B]
@@ -147,6 +155,29 @@ class Learner:
             policy=policy,
         )
 
+    @torch.no_grad()
+    def _average(self) -> None:
+        if self.agent is not self.q_network:
+            of, n = self.settings.averaging, self.num_updates
+            past = min(of, n / (9 + n))  # the first networks are soon forgotten
+            both = zip(self.agent.parameters(), self.q_network.parameters(), strict=True)
+            for mean, newest in both:
+                mean.lerp_(newest, 1.0 - past)
+
+    def begin_with(self, weights: Mapping[str, Any]) -> None:
+        """Gives all networks the same weights, arrays by name, before anything is learned.
+
+        Raises:
+            InputError: they are those of another network.
+        """
+        for network in (self.q_network, self.target_network, self.agent):
+            load_weights(network, weights)
+
+    def standardise(self, seen: Any) -> None:
+        """Makes observations like these `[M, ...]` easy to learn from; before anything is."""
+        for network in (self.q_network, self.target_network, self.agent):
+            network.standardise(seen)
+
     def sync_target(self) -> None:
         """Copies the network to the target network."""
         self.target_network.load_state_dict(self.q_network.state_dict())
@@ -158,10 +189,12 @@ class Learner:
 
     def state_dict(self) -> dict[str, Any]:
         """Returns everything that later updates depend on, as plain numbers and arrays."""
-        return {
+        averaged = self.agent is not self.q_network
+        learning = {"learning": arrays_of(self.q_network.state_dict())} if averaged else {}
+        return learning | {
             "settings": asdict(self.settings),
             "num_updates": self.num_updates,
-            "q_network": arrays_of(self.q_network.state_dict()),
+            "q_network": arrays_of(self.agent.state_dict()),
             "target_network": arrays_of(self.target_network.state_dict()),
             "optimizer": moments_of(self.optimizer, self.q_network),
         }
@@ -181,7 +214,8 @@ class Learner:
             ]
             raise InputError(f"The settings differ: {'; '.join(changed)}.", "Use the same ones.")
         self.num_updates = state["num_updates"]
-        load_weights(self.q_network, state["q_network"])
+        load_weights(self.agent, state["q_network"])
+        load_weights(self.q_network, state.get("learning", state["q_network"]))
         load_weights(self.target_network, state["target_network"])
         load_moments(self.optimizer, self.q_network, state["optimizer"])
 
@@ -210,6 +244,10 @@ def load_weights(network: DecompositionNetwork, weights: Mapping[str, Any]) -> N
     Raises:
         InputError: they are those of another network.
     """
+    images = (
+        {"middle": torch.zeros_like(network.middle)} if isinstance(network, NatureNetwork) else {}
+    )
+    weights = images | dict(weights)  # older files of images know no mean: it was not taken away
     own = {name: tuple(value.shape) for name, value in network.state_dict().items()}
     given = {name: tuple(value.shape) for name, value in weights.items()}
     if own != given:

@@ -27,6 +27,8 @@ class UpdateSettings:
             targets and the loss are float32 in either case.
         temperature: by which logits are divided before they are compared with a teacher's.
         draw: of a policy head: whether it draws its actions, or takes the likeliest.
+        averaging: what the mean of all networks so far weighs at each update, against the newest;
+            0 leaves the newest alone.
 
     Raises:
         InputError: a value is out of its range.
@@ -41,6 +43,7 @@ class UpdateSettings:
     precision: Precision = "float32"
     temperature: float = 1.0
     draw: bool = False
+    averaging: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.learning_rate < float("inf"):
@@ -52,6 +55,10 @@ class UpdateSettings:
             )
         if not 0.0 < self.temperature < float("inf"):
             raise InputError(f"The temperature is {self.temperature}.", "Choose one above 0.")
+        if not 0.0 <= self.averaging < 1.0:
+            raise InputError(
+                f"`averaging` is {self.averaging}.", "Choose 0, or a weight below 1, such as 0.999."
+            )
         longest = self.max_grad_norm
         if longest is not None and not 0.0 < longest < float("inf"):
             raise InputError(f"`max_grad_norm` is {longest}.", "Choose a length above 0.")

@@ -13,7 +13,7 @@ from trdlab.explanations.calibration.report import CalibrationReport, judge, sco
 from trdlab.explanations.moment.exact import exact_moment
 from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.outcome import Trial
-from trdlab.rollouts.branches import Branches, Branching, Copying, TooFewMoments
+from trdlab.rollouts.branches import Branches, Branching, Effort, TooFewMoments
 from trdlab.rollouts.counterfactual import compared, try_actions
 from trdlab.rollouts.episodes import Episode, distinct
 from trdlab.rollouts.playing import Playing, Watch, part_of, unwatched
@@ -35,7 +35,7 @@ def assess(
     episodes: int = 50,
     epsilon: float | None = None,
     max_steps: int | None = None,
-    copying: Copying | None = None,
+    effort: Effort | None = None,
     seed: int = 1000,
     watch: Watch = unwatched,
 ) -> CalibrationReport:
@@ -50,7 +50,7 @@ def assess(
         episodes: how many to play.
         epsilon: the chance of a random action.
         max_steps: after which an episode is cut off, if not before.
-        copying: how states are copied for the ceiling and for foils; without it there are none. Nor
+        effort: how states are copied for the ceiling and for foils; without it there are none. Nor
             are there where states cannot be copied: `lost` of the report then says why.
         seed: of everything.
         watch: told how far the episodes are, after every step.
@@ -68,13 +68,13 @@ def assess(
         chance = 1.0 / (agent.estimator.time_axis.num_steps + 2)
         played = judging.played(chance)
     branches, foils, lost = None, None, ""
-    if copying is not None:
+    if effort is not None:
         length = float(np.mean([len(episode) for episode in played]))
-        every = max(1, round(length / copying.moments))
+        every = max(1, round(length / effort.moments))
         try:
-            branches = judging.copied(copying, chance, every, foils=False)
+            branches = judging.copied(effort, chance, every, foils=False)
             if len(agent.action_names) > 1:
-                foils = judging.copied(copying, chance, every, foils=True)
+                foils = judging.copied(effort, chance, every, foils=True)
         except (NotCopyable, NotParallel) as error:
             branches, lost = None, f"{error.cause} {LOST}"
     report = judge(
@@ -124,16 +124,16 @@ class _Judging:
             what="episodes with some random actions" if epsilon else "episodes to judge by",
         )
 
-    def copied(self, copying: Copying, epsilon: float, every: int, *, foils: bool) -> Branches:
+    def copied(self, effort: Effort, epsilon: float, every: int, *, foils: bool) -> Branches:
         """Returns what else could have followed, of the policy's actions or of foils.
 
         Where a few long episodes hide that most are short, moments are copied more often than
         `every`.
         """
         agent, seed = self.agent, self.seed + 1 + foils
-        branching = Branching(agent.estimator, agent.policy, copying.copies)
+        branching = Branching(agent.estimator, agent.policy, effort.copies)
         try:
-            with closing(agent.make(copying.episodes, seed)) as environments:
+            with closing(agent.make(effort.episodes, seed)) as environments:
                 return branching.along(
                     environments,
                     every=every,
@@ -146,12 +146,12 @@ class _Judging:
         except TooFewMoments:
             if every == 1:
                 raise
-            return self.copied(copying, epsilon, every // 2, foils=foils)
+            return self.copied(effort, epsilon, every // 2, foils=foils)
 
 
 def usual_episodes(agent: Agent) -> int:
     """Returns by how many episodes an agent is judged, where nothing else is said."""
-    return agent.copying.judged
+    return agent.effort.judged
 
 
 def moment_at(agent: Agent, *, seed: int = 0, step: int = 0) -> Moment:
@@ -207,7 +207,7 @@ def try_in_play(
     explicit components, whichever is more.
     """
     steps = max(FOLLOWED, agent.estimator.time_axis.num_steps)
-    branching = Branching(agent.estimator, agent.policy, agent.copying.tries, steps)
+    branching = Branching(agent.estimator, agent.policy, agent.effort.tries, steps)
     one, other = map(agent.action_names.index, (action, foil))
     return try_actions(branching, playing, one, other, seed=seed)
 

@@ -182,8 +182,8 @@ def explain(
         _check_report(report, agent, episodes)
     elif "calibration" in parts and count == 0:
         raise InputError("A calibration needs episodes.", "Ask for `episodes=50`.")
-    is_usual = agent.copying.unasked and {"calibration", "contrast"} & set(wanted)
-    copying = agent.copying if is_usual or "calibration" in parts else None
+    is_usual = agent.effort.unasked and {"calibration", "contrast"} & set(wanted)
+    effort = agent.effort if is_usual or "calibration" in parts else None
     choice, observation, tried, story = None, None, None, None
     missing: list[str] = []
     with agent.begin(seed=seed, max_steps=limit) as recording:
@@ -207,7 +207,7 @@ def explain(
             (episode,) = recording.episodes()
             story = tell(Played(episode, agent.action_names, agent.seconds_per_step))
     if count and report is None:
-        report = assess(agent, episodes=count, max_steps=limit, copying=copying, watch=watch)
+        report = assess(agent, episodes=count, max_steps=limit, effort=effort, watch=watch)
     missing += [] if report is None or not report.lost else [report.lost]
     if choice is not None and report is not None:
         known = replace(choice.moment, calibration=report.calibration, foils=report.foils)

@@ -6,7 +6,7 @@ from trdlab.lazy import lazily
 
 if TYPE_CHECKING:
     from trdlab.rollouts.branches import Branching as Branching
-    from trdlab.rollouts.branches import Copying as Copying
+    from trdlab.rollouts.branches import Effort as Effort
     from trdlab.rollouts.critique import Critique as Critique
     from trdlab.rollouts.critique import critique_of as critique_of
     from trdlab.rollouts.episodes import Episode as Episode

@@ -37,7 +37,7 @@ class Branches(Samples):
 
 
 @dataclass(frozen=True)
-class Copying:
+class Effort:
     """How much is played and copied to judge an agent, where nothing else is said.
 
     Args:

@@ -92,8 +92,8 @@ def memory_of(
 
 def _check_fits(settings: TrainSettings, environments: Environments) -> None:
     from trdlab.deep.device_frames import device_nbytes
-    from trdlab.deep.memory import check_learner, check_memory
-    from trdlab.deep.networks import build_network, learner_nbytes
+    from trdlab.deep.memory import check_learner, check_memory, learner_nbytes
+    from trdlab.deep.networks import build_network
 
     check_memory(memory_of(settings, environments), settings.capacity)
     if "cuda" in settings.device:

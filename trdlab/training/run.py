@@ -85,7 +85,7 @@ class Run:
         if stopped or not settings.checkpoint_episodes or self.trainer.phase == "teacher":
             return None
         learner, step = self.trainer.learner, self.trainer.clock
-        agent = estimator_of(settings, learner.q_network, learner.device)
+        agent = estimator_of(settings, learner.agent, learner.device)
         result = evaluate_checkpoint(self.folder, settings, step, agent)
         self.seconds += time.perf_counter() - begun
         return float(result.returns.mean())

@@ -46,7 +46,7 @@ def calibrate(
         episodes=usual_episodes(judged) if episodes is None else episodes,
         epsilon=epsilon,
         max_steps=usual_limit(judged.estimator.time_axis) if max_steps is None else max_steps,
-        copying=judged.copying,
+        effort=judged.effort,
         seed=seed,
         watch=watch or unwatched,
     )

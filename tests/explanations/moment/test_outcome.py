@@ -12,7 +12,7 @@ from by_hand import try_out
 from trdlab.agents import Agent, gridworld_agent, tabular_agent
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.explanations import moment_at
-from trdlab.explanations.assessment import Copying, assess
+from trdlab.explanations.assessment import Effort, assess
 from trdlab.explanations.moment.outcome import TRIALS, Trial, in_brief, sections
 from trdlab.explanations.rules import Claim, check
 from trdlab.policies import Memoryless
@@ -123,7 +123,7 @@ def test_without_chance_it_says_so_and_gives_no_interval():
 
 def test_what_is_too_rare_to_be_seen_is_no_verdict():
     agent = tabular_agent("FrozenLake-v1", TimeAxis(0.95, 8))
-    report = assess(agent, episodes=100, copying=agent.copying)
+    report = assess(agent, episodes=100, effort=agent.effort)
     for seed in range(6):
         trial = try_out(agent, "left", "down", seed=seed, report=report)
         assert {claim.kind for claim in in_brief(trial)} == {"too-few-tries"}  # type: ignore[arg-type]
@@ -177,12 +177,12 @@ def test_less_than_was_promised_is_found_out_too():
 
 def test_foils_are_judged_beside_what_the_agent_does():
     agent = gridworld_agent("ledge", AXIS)
-    copying = Copying(episodes=60, moments=5, copies=8)
-    healthy = assess(agent, episodes=100, copying=copying)
+    effort = Effort(episodes=60, moments=5, copies=8)
+    healthy = assess(agent, episodes=100, effort=effort)
     assert healthy.foils is not None
     assert healthy.foils.trust.components >= 3
     invents = changed(agent, action=2, component=0, by=1.0)  # left, which it never takes
-    worse = assess(replace(invents, policy=agent.policy), episodes=100, copying=copying)
+    worse = assess(replace(invents, policy=agent.policy), episodes=100, effort=effort)
     assert worse.trust.components == healthy.trust.components
     assert worse.foils is not None
     assert worse.foils.trust.components == 0

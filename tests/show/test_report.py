@@ -17,6 +17,7 @@ from doors import Doors
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError, OutputError
 from trdlab.estimator import Future
+from trdlab.runs.pretrained import pretrained_names
 
 EVIL = "<script>alert(1)</script>"
 
@@ -193,9 +194,10 @@ def test_numbers_are_those_of_the_json(evil, drone):
     assert held(evil)["single"]
 
 
-def test_where_it_looks_is_shown_for_the_bar_that_is_pointed_at(browser, tmp_path):
-    how = {"episodes": 0, "others": 0, "max_steps": 60}
-    out = trdlab.report("pretrained:Breakout", out=tmp_path / "b.html", **how)
+@pytest.mark.parametrize("game", pretrained_names())
+def test_where_it_looks_is_shown_for_the_bar_that_is_pointed_at(browser, tmp_path, game):
+    how = {"episodes": 0, "others": 0, "max_steps": 30}
+    out = trdlab.report(f"pretrained:{game}", out=tmp_path / "b.html", **how)
     visit = Visit(browser, out)
     assert visit.page.locator("#looks").is_hidden()
     assert visit.text("#look-where") == "Point at a bar to see where the agent looks for it."

@@ -1,7 +1,8 @@
 """trdlab: when does an agent expect which reward, and how far can that be trusted?
 
-The verbs: `solve` a model, `train` a network, or name an `agent`; then `calibrate`, `explain` and
-`compare` it. The nouns: `Agent`, `Estimator`, `Future`, `RewardDecomposition`, `TimeAxis`.
+The verbs: `solve` a model, `train` a network, or name an `agent`; then `calibrate`, `explain`,
+`report` and `compare` it. The nouns: `Agent`, `Estimator`, `Future`, `RewardDecomposition`,
+`TimeAxis`.
 """
 
 import os
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from trdlab.verbs.asking import calibrate, compare, explain
     from trdlab.verbs.fitting import fit
     from trdlab.verbs.making import agent, solve, train
+    from trdlab.verbs.reporting import report
 
 __version__ = "0.1.0"
 __all__ = [
@@ -36,6 +38,7 @@ __all__ = [
     "explain",
     "fit",
     "load",
+    "report",
     "solve",
     "train",
 ]

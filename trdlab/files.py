@@ -85,6 +85,23 @@ def new_folder(parent: Path, stem: str) -> Path:
             return path
 
 
+def free_file(parent: Path, stem: str, suffix: str) -> Path:
+    """Returns the first of `stem`, `stem-2`, … with an ending that is not there yet, in a folder.
+
+    The folder is made if there is none.
+
+    Raises:
+        OutputError: it cannot be made.
+    """
+    try:
+        parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        cause = f"Cannot make the folder '{parent}': {error.strerror or error}."
+        raise OutputError(cause, "Choose another folder.") from error
+    names = (parent / f"{stem}{'' if at == 1 else f'-{at}'}{suffix}" for at in count(1))
+    return next(path for path in names if not path.exists() and not path.is_symlink())
+
+
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Writes a file or a folder under a temporary name beside it, and renames it when complete.
 

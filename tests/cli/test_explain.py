@@ -36,7 +36,9 @@ def test_without_options_it_says_what_matters_most_and_where_pictures_went(expla
     moments = ["forecast-seed-0-step-0.png", "contrast-seed-0-step-0.png"]
     names = [*moments, "episode-seed-0.png", "calibration.png"]
     paths = [Path("explanations") / "drone" / name for name in names]
-    assert err.splitlines() == [f"Picture: {path}" for path in paths]
+    *told, hint = err.splitlines()
+    assert told == [f"Picture: {path}" for path in paths]
+    assert hint == "To go through the episode in a browser: trdlab report gridworld:drone"
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
     explain("gridworld:drone", "--episodes", 40)
     assert (tmp_path / "explanations" / "drone-2" / "calibration.png").exists()
@@ -273,7 +275,8 @@ def test_what_began_at_once_gets_a_folder_of_its_own(trdlab, monkeypatch, words,
 
     monkeypatch.setattr(Playing, "take", take)
     code, _, err = trdlab(*words, "--episodes", 2)
-    pictures = [Path(line.removeprefix("Picture: ")) for line in err.splitlines()]
+    told = [line for line in err.splitlines() if line.startswith("Picture: ")]
+    pictures = [Path(line.removeprefix("Picture: ")) for line in told]
     assert code == 0
     assert {path.parent for path in pictures} == {Path("explanations") / f"{name}-2"}
     assert all(path.exists() for path in pictures)

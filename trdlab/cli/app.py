@@ -14,6 +14,7 @@ COMMANDS = {
     "tabular": "trdlab.cli.tabular",
     "explain": "trdlab.cli.explain",
     "video": "trdlab.cli.video",
+    "report": "trdlab.cli.report",
     "compare": "trdlab.cli.compare",
     "agent": "trdlab.cli.agent",
     "fit": "trdlab.cli.fit",

@@ -142,3 +142,8 @@ def explain(
         for part, path in paths.items():
             if (figure := part_figure(explained, part)) is not None:
                 common.save_picture(figure, out / path.name)
+    if not parts and not as_json:
+        told = {"--seed": seed or None, "--step": step or None}
+        words = (agent,) if found.origin is None else found.origin.words
+        hint = common.command(["report", *words], told)
+        common.say(common.errors(), f"To go through the episode in a browser: {hint}")

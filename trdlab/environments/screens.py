@@ -1,5 +1,7 @@
 """Gymnasium environments that also show what people see of them."""
 
+import os
+import sys
 import warnings
 from dataclasses import replace
 from typing import Any
@@ -86,6 +88,10 @@ def drawn_as(given: tuple[Any, int, dict[str, Any]], count: int, metadata: Any) 
         count: how many.
         metadata: of those others: it says whether they can draw.
     """
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+        os.environ.setdefault(
+            "SDL_VIDEODRIVER", "dummy"
+        )  # else SDL complains that it has no screen
     env, seed, arguments = given
     if isinstance(env, str) and MODE in (metadata or {}).get("render_modes", ()):
         arguments = {"render_mode": MODE} | arguments

@@ -96,6 +96,20 @@ class Explanation(Printable):
         seen = None if self.agent.world is None else self.observation
         return None if seen is None else int(seen)
 
+    def to_html(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Writes the page about it and all of its episode, and returns where that is.
+
+        Args:
+            path: of the file, which ends in `.html`.
+            overwrite: whether it may replace a file.
+
+        Raises:
+            OutputError: the file exists, or cannot be written.
+        """
+        show = import_module("trdlab.show.report.report")  # found by its name, as by `Printable`
+        written: Path = show.write_report(self, Path(path), overwrite=overwrite)
+        return written
+
     @cached_property
     def answer(self) -> tuple[Claim, ...]:
         """The few sentences that matter most: how it does, what it expects, how far to trust it."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from trdlab.errors import OutputError
-from trdlab.study.kit import GROUPS, Group, html, key, text, write_kit
+from trdlab.study.kit import FILES, Group, html, key, text, write_kit
 from trdlab.study.trials import Trial, draw_trials
 
 TRIALS = draw_trials(3, 6)
@@ -41,7 +41,7 @@ def test_readers_of_q_see_what_each_action_is_worth_and_no_sentence():
     assert all(len(line) <= 78 for line in printed.splitlines())
 
 
-@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("group", FILES)
 def test_the_page_loads_nothing_and_stands_alone(group: Group):
     page = html(TRIALS, group)
     assert not re.search(r"https?:|//\w|\b(src|href)=|@import|url\(", page)
@@ -49,14 +49,14 @@ def test_the_page_loads_nothing_and_stands_alone(group: Group):
     assert "$" not in page  # no slot was left open
 
 
-@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("group", FILES)
 def test_sentences_to_readers_are_short(group: Group):
     head = text(TRIALS, group).partition("-----")[0]
     sentences = (s for paragraph in head.split("\n\n") for s in re.split(r"[.:?]\s", paragraph))
     assert all(len(sentence.split()) <= 25 for sentence in sentences)
 
 
-@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("group", FILES)
 def test_the_key_is_in_the_page_and_cannot_be_read_by_accident(group: Group):
     page, answers = html(TRIALS, group), "".join(trial.letter for trial in TRIALS)
     hidden = re.search(r'<script id="key"[^>]*>([^<]*)</script>', page)

@@ -47,14 +47,13 @@ def test_readers_are_scored_each_and_together():
     assert found.overall.rate.value == pytest.approx(8 / 12)
     assert found.trials[1] == {"B": 1, "A": 1}
     assert found.trials[5] == {"C": 1, "-": 1}
-    assert (scores.groups.keys(), scores.help) == ({"text"}, None)
+    assert (scores.groups.keys(), scores.help) == ({"text"}, {})
 
 
 def test_the_text_is_held_against_q_alone_trial_by_trial():
     text, q = {"Ada": "ABCABC"}, {"Cleo": "ABACCC", "Dan": "BBACCC"}
-    found = score(key_of("ABCABC"), {"text": text, "q": q}).help
+    found = score(key_of("ABCABC"), {"text": text, "q": q}).help["q"]
     # right are 1 1 1 1 1 1 of the text and ½ 1 0 0 0 1 of Q: the differences are ½ 0 1 1 1 0
-    assert found is not None
     assert found.difference.value == pytest.approx(3.5 / 6)
     assert 0.0 <= found.difference.low < 3.5 / 6 < found.difference.high <= 1.0
     assert found.p_value == 1 / 16  # all four signs that matter have to be the same
@@ -72,7 +71,7 @@ def test_the_page_says_what_each_group_gets_and_whether_the_text_helps():
     told = " ".join(printed(score(key_of("ABC" * 4), {"text": text, "q": q})).split())
     assert "Readers of the text: 10 of 12 answers are right, 83 % (52 to 98 %)." in told
     assert "Readers of Q alone: 3 of 24 answers are right, 12 % (3 to 32 %)." in told
-    assert "The text helps: its readers are right more often than those of Q, by 71 " in told
+    assert "The text helps: its readers are right more often than those of Q alone, by 71 " in told
     found = printed(score(key_of("ABC" * 4), {"text": {**text, "Ben": "-" * 12}}))
     rows = {line.split()[0]: line.split() for line in found.splitlines() if line.strip()}
     assert rows["Ada"][1:4] == ["10/12", "83", "%"]
@@ -100,10 +99,10 @@ def test_texts_that_mislead_are_shown():
 def test_scores_as_data():
     given = {"text": {"Ada": "ABA"}, "q": {"Ben": "CBC"}}
     data: dict[str, Any] = to_dict(score(key_of("ABC"), given))
-    assert data["schema"] == "trdlab.study-scores/2"
+    assert data["schema"] == "trdlab.study-scores/3"
     assert data["groups"]["text"]["overall"] == data["groups"]["text"]["readers"]["Ada"]
     assert data["groups"]["q"]["overall"]["right"] == 2
-    assert data["help"]["difference"] == 0.0
+    assert data["help"]["q"]["difference"] == 0.0
     assert data["trials"][2] == {
         "answer": "C",
         "given": {"text": {"A": 1}, "q": {"C": 1}},

@@ -3,7 +3,7 @@
 Everything is a filled polygon in data units (numbers too), so a map looks the same at any size.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -27,18 +27,37 @@ from trdlab.gridworld.icons import Shape
 from trdlab.gridworld.world import Gridworld, Place, State
 
 _DEGREES = (90.0, 270.0, 180.0, 0.0)  # of up, down, left and right, anticlockwise from the right
-_ICONS: dict[str, Callable[[], list[Shape]]] = {
-    "coin": icons.coin,
-    "treasure": icons.chest,
-    "hazard": icons.hazard,
-    "fountain": icons.fountain,
-    "exit": icons.exit_flag,
-}
-_TRACES = {"coin": icons.coin_taken, "treasure": icons.chest_taken}
 _UNSAID = {"coin": 1.0, "fountain": 1.0, "exit": 0.0}  # the values that go without saying
 
 ABOVE_ROUTES = 5.0
 """The zorder of what stands on the ground of a map: coins, treasures, hazards, the drone."""
+
+
+class Look(NamedTuple):
+    """How things on a map are drawn.
+
+    Args:
+        icons: by the kind of a cell.
+        traces: what is left of those that pay once, when they are taken.
+        tells_values: whether what they pay is written on them, where that does not go without
+            saying.
+    """
+
+    icons: Mapping[str, Callable[[], list[Shape]]]
+    traces: Mapping[str, Callable[[], list[Shape]]]
+    tells_values: bool = True
+
+
+USUAL = Look(
+    icons={
+        "coin": icons.coin,
+        "treasure": icons.chest,
+        "hazard": icons.hazard,
+        "fountain": icons.fountain,
+        "exit": icons.exit_flag,
+    },
+    traces={"coin": icons.coin_taken, "treasure": icons.chest_taken},
+)
 
 
 class Paint(NamedTuple):
@@ -53,7 +72,7 @@ class Paint(NamedTuple):
     colour: str
 
 
-def draw_map(ax: Axes, world: Gridworld, state: int) -> Axes:
+def draw_map(ax: Axes, world: Gridworld, state: int, look: Look = USUAL) -> Axes:
     """Draws a state of a gridworld: the map, what is left on it, and the drone.
 
     One cell is one unit; the centre of row r, column c lies at (c + ½, r + ½), and rows grow
@@ -64,6 +83,7 @@ def draw_map(ax: Axes, world: Gridworld, state: int) -> Axes:
         ax: the axes to draw on; they lose their ticks and frame.
         world: the gridworld.
         state: the index of one of its states.
+        look: how things are drawn.
 
     Returns:
         `ax`.
@@ -72,7 +92,7 @@ def draw_map(ax: Axes, world: Gridworld, state: int) -> Axes:
         InputError: there is no such state.
     """
     rows, columns = world.grid.shape
-    for paints, zorder in zip(_scene(world, state), (1.0, ABOVE_ROUTES), strict=True):
+    for paints, zorder in zip(_scene(world, state, look), (1.0, ABOVE_ROUTES), strict=True):
         paths, colours = zip(*paints, strict=True)
         scene = PathCollection(
             paths, facecolors=colours, linewidths=0, antialiaseds=True, zorder=zorder
@@ -84,7 +104,9 @@ def draw_map(ax: Axes, world: Gridworld, state: int) -> Axes:
     return ax
 
 
-def frame(world: Gridworld, state: int, cell_pixels: int = 64) -> npt.NDArray[np.uint8]:
+def frame(
+    world: Gridworld, state: int, cell_pixels: int = 64, look: Look = USUAL
+) -> npt.NDArray[np.uint8]:
     """Returns a picture `[rows · cell_pixels, columns · cell_pixels, 3]` of a state, no margin.
 
     Raises:
@@ -98,7 +120,7 @@ def frame(world: Gridworld, state: int, cell_pixels: int = 64) -> npt.NDArray[np
     figure = Figure(figsize=(columns, rows), dpi=cell_pixels)  # an inch is a cell
     figure.set_layout_engine("none")  # whatever the user's settings say
     canvas = FigureCanvasAgg(figure)
-    draw_map(figure.add_axes((0.0, 0.0, 1.0, 1.0)), world, state)
+    draw_map(figure.add_axes((0.0, 0.0, 1.0, 1.0)), world, state, look)
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     return np.array(pixels[..., :3], order="C")
@@ -112,7 +134,7 @@ def _state(world: Gridworld, state: int) -> State:
     return world.states[state]
 
 
-def _scene(world: Gridworld, state: int) -> tuple[list[Paint], list[Paint]]:
+def _scene(world: Gridworld, state: int, look: Look) -> tuple[list[Paint], list[Paint]]:
     """Returns the ground, and what stands on it, each from back to front."""
     grid, at = world.grid, _state(world, state)
     rows, columns = grid.shape
@@ -125,9 +147,9 @@ def _scene(world: Gridworld, state: int) -> tuple[list[Paint], list[Paint]]:
     for place in (place for place in places if place not in walls):
         ground += _ground(grid, place)
         if place not in at.collected:
-            things += _item(grid.cell(*place), place)
+            things += _item(grid.cell(*place), place, look)
         elif place != at.place:  # the drone hides the traces of what it has just taken
-            things += _placed(_TRACES[grid.cell(*place).kind](), place)
+            things += _placed(look.traces[grid.cell(*place).kind](), place)
     return ground, [*things, *_placed(icons.drone(), at.place)]
 
 
@@ -149,12 +171,12 @@ def _ground(grid: GridMap, place: Place) -> list[Paint]:
     return _placed(shapes, place)
 
 
-def _item(cell: Cell, place: Place) -> list[Paint]:
+def _item(cell: Cell, place: Place, look: Look) -> list[Paint]:
     """Returns the coin, treasure, hazard, fountain or exit in a cell, with what it pays."""
-    if cell.kind not in _ICONS:
+    if cell.kind not in look.icons:
         return []
-    shapes = _ICONS[cell.kind]()
-    if cell.value == _UNSAID.get(cell.kind):
+    shapes = look.icons[cell.kind]()
+    if not look.tells_values or cell.value == _UNSAID.get(cell.kind):
         return _placed(shapes, place)
     if cell.kind == "coin":
         return [*_placed(shapes, place), *_number(cell.value, place, width=0.3, height=0.19)]

@@ -1,35 +1,27 @@
 """The kit of a blind reading: pages to answer in, questions to print, answers for who asks."""
 
-import json
-import textwrap
-from base64 import b64encode
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from html import escape
 from itertools import chain
 from pathlib import Path
-from string import Template
 from typing import Any, Literal
 
 from trdlab import __version__
-from trdlab.errors import OutputError
 from trdlab.files import write_json, write_whole
+from trdlab.study import sheets
 from trdlab.study.candidates import CANDIDATES, LETTERS
 from trdlab.study.crossroads import LATE, SOON, TIME_AXIS
+from trdlab.study.design import BLIND_READING
+from trdlab.study.sheets import ANSWERS, wrapped
 from trdlab.study.trials import Trial
 
-SCHEMA = "trdlab.study/2"
-ANSWERS = "answers.json"
 Group = Literal["text", "q"]
-GROUPS: dict[Group, str] = {"text": "Readers of the text", "q": "Readers of Q alone"}
 """Who answers: those who read the text, and the control group, which sees the Q-values alone."""
 FILES: dict[Group, tuple[str, str]] = {
     "text": ("study.html", "questions.txt"),
     "q": ("study-q.html", "questions-q.txt"),
 }
-_TEMPLATE = Path(__file__).parent / "page.html"
-_WIDTH = 78
-_NO_BREAK = "\N{NO-BREAK SPACE}"
 _TITLE = "Which agent is it?"
 _FIRST = "Three agents choose between four actions. Each of them does what is worth most to itself:"
 _RISK = (
@@ -76,13 +68,10 @@ def write_kit(folder: Path, trials: Sequence[Trial], seed: int) -> tuple[Path, .
         OutputError: one of the files exists, or they cannot be written.
     """
     paths = kit_paths(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _unwritable(folder, error) from error
+    sheets.make_folder(folder)
     for group, names in FILES.items():
         for name, write in zip(names, (html, text), strict=True):
-            write_whole(folder / name, _writing(write(trials, group)))
+            write_whole(folder / name, sheets.writing(write(trials, group)))
     write_json(folder / ANSWERS, key(trials, seed))
     return paths
 
@@ -93,24 +82,13 @@ def kit_paths(folder: Path) -> tuple[Path, ...]:
     Raises:
         OutputError: one of them does, or the folder is a file.
     """
-    paths = tuple(folder / name for name in (*chain(*FILES.values()), ANSWERS))
-    try:
-        folder.resolve()  # raises where no folder can have this name
-        is_file = folder.exists() and not folder.is_dir()
-        there = [path for path in paths if path.exists()]
-    except (OSError, ValueError) as error:
-        raise _unwritable(folder, error) from error
-    if is_file:
-        raise OutputError(f"'{folder}' is a file.", "Name a folder for the kit.")
-    if there:
-        raise OutputError(f"The file '{there[0]}' exists.", "Choose another `out`.")
-    return paths
+    return sheets.free_paths(folder, (*chain(*FILES.values()), ANSWERS))
 
 
 def key(trials: Sequence[Trial], seed: int) -> dict[str, Any]:
     """Returns the answers as plain data: letters in one text, and the trials in full."""
     return {
-        "schema": SCHEMA,
+        "schema": BLIND_READING.schema,
         "trdlab": __version__,
         "seed": seed,
         "answers": _answers(trials),
@@ -121,34 +99,35 @@ def key(trials: Sequence[Trial], seed: int) -> dict[str, Any]:
 
 def text(trials: Sequence[Trial], group: Group = "text") -> str:
     """Returns the questions as plain text, to print or to read aloud."""
-    choices = [_wrapped(c.about, f"  {c.letter}  ", "     ") for c in CANDIDATES]
-    lines = [_TITLE.upper(), "", _wrapped(_FIRST), "", *choices, ""]
+    choices = sheets.choices(CANDIDATES)
+    lines = [_TITLE.upper(), "", wrapped(_FIRST), "", *choices, ""]
     for paragraph in _INTRO[group]:
-        lines += [_wrapped(paragraph), ""]
+        lines += [wrapped(paragraph), ""]
     for number, trial in enumerate(trials, 1):
-        lines += ["-" * _WIDTH, f"Trial {number} of {len(trials)}", ""]
+        lines += ["-" * sheets.WIDTH, f"Trial {number} of {len(trials)}", ""]
         lines += _sentences(trial) if group == "text" else _worths(trial)
-        lines += [f"{_TITLE}   {'   '.join(f'[ ] {letter}' for letter in LETTERS)}", ""]
+        lines += [sheets.ticks(_TITLE, LETTERS), ""]
     return "\n".join(lines)
 
 
 def html(trials: Sequence[Trial], group: Group = "text") -> str:
     """Returns the page: all in one file, which loads nothing and shows the score itself."""
-    about = (f"<dt>{c.letter}</dt><dd>{escape(c.about)}</dd>" for c in CANDIDATES)
-    intro = [_paragraph(_FIRST), f"<dl>{''.join(about)}</dl>", *map(_paragraph, _INTRO[group])]
-    sets = (_fieldset(trial, at, len(trials), group) for at, trial in enumerate(trials, 1))
-    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
-        intro="\n".join(intro),
-        questions=FILES[group][1],
-        trials="\n".join(sets),
-        key=_hidden(trials),
+    parts = map(sheets.paragraph, _INTRO[group])
+    return sheets.page(
+        title=_TITLE,
+        intro=[sheets.paragraph(_FIRST), sheets.listed(CANDIDATES), *parts],
+        trials=["\n".join((_lists if group == "text" else _table)(trial)) for trial in trials],
+        reasons=[trial.reason for trial in trials],
+        answers=_answers(trials),
+        candidates=CANDIDATES,
+        without_script=FILES[group][1],
     )
 
 
 def _sentences(trial: Trial) -> Iterator[str]:
     for heading, sentences in trial.parts:
         yield f"{heading}:"
-        yield from (_wrapped(told, "  - ", "    ") for told in sentences)
+        yield from (wrapped(told, "  - ", "    ") for told in sentences)
         yield ""
 
 
@@ -164,27 +143,9 @@ def _note(trial: Trial, name: str) -> str:
     return {trial.action: "which it takes", trial.foil: "the next best"}.get(name, "")
 
 
-def _unwritable(folder: Path, error: Exception) -> OutputError:
-    reason = getattr(error, "strerror", None) or error
-    return OutputError(f"Cannot make '{folder}': {reason}.", "Choose another `out`.")
-
-
-def _fieldset(trial: Trial, number: int, count: int, group: Group) -> str:
-    lines = [f"<fieldset><legend>Trial {number} of {count}</legend>"]
-    lines += _lists(trial) if group == "text" else _table(trial)
-    lines += [f'<p class="ask">{_TITLE}</p>', '<div class="choices">']
-    lines += [
-        f'<label><input type="radio" name="trial-{number}" value="{c.letter}">'
-        f"<span><strong>{c.letter}</strong> {escape(c.about)}</span></label>"
-        for c in CANDIDATES
-    ]
-    return "\n".join([*lines, "</div></fieldset>"])
-
-
 def _lists(trial: Trial) -> Iterator[str]:
-    for heading, sentences in trial.parts:
-        items = "".join(f"<li>{_unbroken(escape(told))}</li>" for told in sentences)
-        yield f"<h3>{escape(heading)}</h3>\n<ul>{items}</ul>"
+    for heading, told in trial.parts:
+        yield sheets.sentences(heading, told)
 
 
 def _table(trial: Trial) -> Iterator[str]:
@@ -195,29 +156,5 @@ def _table(trial: Trial) -> Iterator[str]:
     yield "</table>"
 
 
-def _hidden(trials: Sequence[Trial]) -> str:
-    """Returns the answers such that they cannot be read by accident."""
-    data = {"answers": _answers(trials), "reasons": [trial.reason for trial in trials]}
-    return b64encode(json.dumps(data).encode()).decode()
-
-
-def _answers(trials: Iterable[Trial]) -> str:
+def _answers(trials: Sequence[Trial]) -> str:
     return "".join(trial.letter for trial in trials)
-
-
-def _paragraph(words: str) -> str:
-    return f"<p>{escape(words)}</p>"
-
-
-def _wrapped(words: str, first: str = "", later: str = "") -> str:
-    filled = textwrap.fill(_unbroken(words), _WIDTH, initial_indent=first, subsequent_indent=later)
-    return filled.replace(_NO_BREAK, " ")
-
-
-def _unbroken(words: str) -> str:
-    """Returns a text in which no line begins with a percent sign."""
-    return words.replace(" %", f"{_NO_BREAK}%")
-
-
-def _writing(content: str) -> Callable[[Path], object]:
-    return lambda temporary: temporary.write_text(content, encoding="utf-8")

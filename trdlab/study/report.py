@@ -1,4 +1,4 @@
-"""The scores of a blind reading as a page, and as plain data."""
+"""The scores of a study as a page, and as plain data."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,16 +11,15 @@ from rich.text import Text
 from trdlab.formatting import percent
 from trdlab.show.text import plain_ascii, wrapped
 from trdlab.statistics import Estimate
-from trdlab.study.candidates import LETTERS
-from trdlab.study.kit import GROUPS, Group
-from trdlab.study.scoring import CHANCE, NO_ANSWER, GroupScores, Help, Score, Scores
+from trdlab.study.design import Design
+from trdlab.study.scoring import NO_ANSWER, GroupScores, Help, Score, Scores
 
 _SURE = 0.05
 """Below this probability under chance alone, a difference is told as one."""
 
 
 def page(scores: Scores, *, width: int = 80, ascii_only: bool = False) -> RenderableType:
-    """Returns the scores to read: does the text help, each group, and each trial.
+    """Returns the scores to read: does what is tested help, each group, and each trial.
 
     Args:
         scores: of a class.
@@ -28,21 +27,24 @@ def page(scores: Scores, *, width: int = 80, ascii_only: bool = False) -> Render
         ascii_only: for terminals without UTF-8.
     """
     lines: list[Text | Table] = []
-    if scores.help is not None:
-        lines += [*wrapped(_helped(scores.help), width, "bold"), Text()]
+    design = scores.key.design
+    for control, of in scores.help.items():
+        lines += [*wrapped(_helped(of, design, control), width, "bold"), Text()]
     for name, group in scores.groups.items():
-        lines += [*wrapped(_rated(name, group.overall), width, "bold"), Text()]
+        lines += [*wrapped(_rated(design, name, group.overall), width, "bold"), Text()]
         lines += [_readers(group, ascii_only=ascii_only), Text()]
-    lines += [_trials(scores), *_misled(scores, width)]
+    lines += [*_trials(scores), *_misled(scores, width)]
+    lines = lines[:-1]  # an empty one
     return Lines(*(_plain(line) if ascii_only else line for line in lines))
 
 
 def to_dict(scores: Scores) -> dict[str, Any]:
-    """Returns the scores as plain data; the schema is `trdlab.study-scores/2`."""
+    """Returns the scores as plain data; the schema is `trdlab.study-scores/3`."""
     answers = scores.key.answers
     return {
-        "schema": "trdlab.study-scores/2",
-        "chance": CHANCE,
+        "schema": "trdlab.study-scores/3",
+        "study": scores.key.design.schema,
+        "chance": scores.key.design.chance,
         "groups": {
             name: {
                 "overall": _score_to_dict(of.overall),
@@ -50,7 +52,7 @@ def to_dict(scores: Scores) -> dict[str, Any]:
             }
             for name, of in scores.groups.items()
         },
-        "help": None if scores.help is None else _help_to_dict(scores.help),
+        "help": {control: _help_to_dict(of) for control, of in scores.help.items()},
         "trials": [
             {
                 "answer": answer,
@@ -77,27 +79,33 @@ def _help_to_dict(of: Help) -> dict[str, Any]:
     return {"difference": of.difference.value, "interval": interval, "p_value": of.p_value}
 
 
-def _helped(of: Help) -> str:
+def _helped(of: Help, design: Design, control: str) -> str:
+    tested, other = design.groups[design.tested], design.groups[control]
     low, high = sorted(abs(100.0 * end) for end in (of.difference.low, of.difference.high))
     points = f"{abs(100 * of.difference.value):.0f} percentage points ({low:.0f} to {high:.0f})"
+    subject, whose = (
+        f"{tested[0].upper()}{tested[1:]}",
+        f"often than those of {other}, by {points}.",
+    )
     if of.p_value < _SURE:
-        told = f"The text helps: its readers are right more often than those of Q, by {points}."
+        told = f"{subject} helps: its readers are right more {whose}"
     elif of.difference.high < 0.0:
-        return f"The text misleads: its readers are right less often than those of Q, by {points}."
+        return f"{subject} misleads: its readers are right less {whose}"
     else:
         told = (
-            "These answers do not tell whether the text helps: its readers are right by "
-            f"{100 * of.difference.value:+.0f} percentage points more often than those of Q "
+            f"These answers do not tell whether {tested} helps: its readers are right by "
+            f"{100 * of.difference.value:+.0f} percentage points more often than those of {other} "
             f"({100 * of.difference.low:+.0f} to {100 * of.difference.high:+.0f})."
         )
     return f"{told} Chance alone does as much with a probability of {_small(of.p_value)}."
 
 
-def _rated(name: Group, of: Score) -> str:
+def _rated(design: Design, name: str, of: Score) -> str:
     return (
-        f"{GROUPS[name]}: {of.right} of {of.total} answers are right, {percent(of.rate.value)} % "
-        f"({_range(of.rate, '%')}). Guessing gets {percent(CHANCE)} % on average, and so many "
-        f"right with a probability of {_small(of.p_value)}."
+        f"Readers of {design.groups[name]}: {of.right} of {of.total} answers are right, "
+        f"{percent(of.rate.value)} % ({_range(of.rate, '%')}). Guessing gets "
+        f"{percent(design.chance)} % on average, and so many right with a probability of "
+        f"{_small(of.p_value)}."
     )
 
 
@@ -114,33 +122,32 @@ def _readers(group: GroupScores, *, ascii_only: bool) -> Table:
     return table
 
 
-def _trials(scores: Scores) -> Table:
-    """Returns, of each trial, how often each group gave each answer."""
-    several = len(scores.groups) > 1
-    heads = [f"{name} {x}" if several else x for name in scores.groups for x in (*LETTERS, "none")]
-    table = _table("trial", "answer", *heads)
-    for i, answer in enumerate(scores.key.answers):
-        given = (of.trials[i].get(x, 0) for of in scores.groups.values() for x in _GIVEN)
-        table.add_row(str(i + 1), answer, *map(str, given))
-    return table
-
-
-_GIVEN = (*LETTERS, NO_ANSWER)
+def _trials(scores: Scores) -> Iterator[Table | Text]:
+    """Yields for each group a table: how often each answer was given in each trial."""
+    key, letters = scores.key, (*scores.key.design.letters, NO_ANSWER)
+    for name, of in scores.groups.items():
+        head = "trial" if len(scores.groups) == 1 else f"trial ({name})"
+        table = _table(head, "answer", *(x.replace(NO_ANSWER, "none") for x in letters))
+        for i, answer in enumerate(key.answers):
+            table.add_row(str(i + 1), answer, *(str(of.trials[i].get(x, 0)) for x in letters))
+        yield from (table, Text())
 
 
 def _misled(scores: Scores, width: int) -> Iterator[Text]:
     """Yields the texts that most readers took for those of another agent."""
-    group, key = scores.groups.get("text"), scores.key
+    key = scores.key
+    group = scores.groups.get(key.design.tested)
     for i in [] if group is None else group.misled(key.answers):
         given = group.trials[i] if group is not None else {}
-        taken = max(LETTERS, key=lambda x: given.get(x, 0))
+        taken = max(key.design.letters, key=lambda x: given.get(x, 0))
         told = (
             f"Trial {i + 1} misleads: {given[taken]} took it for {taken}, "
             f"{given.get(key.answers[i], 0)} for {key.answers[i]}, which is right. It says:"
         )
-        yield from (Text(), *wrapped(told, width, "bold"))
+        yield from wrapped(told, width, "bold")
         for sentence in key.texts[i]:
             yield from wrapped(sentence, width, indent=2)
+        yield Text()
 
 
 def _table(*columns: str) -> Table:

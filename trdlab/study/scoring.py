@@ -1,4 +1,4 @@
-"""Scores of a blind reading: each group against guessing, and the text against Q alone."""
+"""Scores of a study: each group against guessing, and the group that is tested against controls."""
 
 import json
 import re
@@ -15,13 +15,9 @@ from trdlab.arrays import FloatArray
 from trdlab.errors import InputError
 from trdlab.files import read_json
 from trdlab.statistics import Estimate, bootstrap
-from trdlab.study.candidates import LETTERS
-from trdlab.study.kit import GROUPS, SCHEMA, Group
+from trdlab.study.design import BLIND_READING, DESIGNS, Design
 
-CHANCE = 1 / len(LETTERS)
-"""How often a guess is right."""
 NO_ANSWER = "-"
-_PARTS = ("why", "promise", "instead")  # of what a trial says
 
 Answers = Mapping[str, str]
 """The answers of readers by name, a letter for each trial."""
@@ -34,10 +30,12 @@ class Key:
     Args:
         answers: the right ones, a letter for each trial.
         texts: of each trial, the sentences that readers saw.
+        design: of the study.
     """
 
     answers: str
     texts: tuple[tuple[str, ...], ...]
+    design: Design = BLIND_READING
 
 
 @dataclass(frozen=True)
@@ -57,15 +55,15 @@ class Score:
     p_value: float
 
     @classmethod
-    def of(cls, right: int, total: int) -> "Score":
-        """Returns the score of so many right answers.
+    def of(cls, right: int, total: int, chance: float = BLIND_READING.chance) -> "Score":
+        """Returns the score of so many right answers, each of which may be guessed by chance.
 
         >>> Score.of(10, 12).p_value < 0.001, Score.of(4, 12).p_value > 0.5
         (True, True)
         """
         from scipy.stats import binomtest
 
-        test = binomtest(right, total, CHANCE, alternative="greater")
+        test = binomtest(right, total, chance, alternative="greater")
         interval = binomtest(right, total).proportion_ci(0.95, method="exact")
         rate = Estimate(right / total, float(interval.low), float(interval.high))
         return cls(right, total, rate, float(test.pvalue))
@@ -102,7 +100,7 @@ class GroupScores:
 
 @dataclass(frozen=True)
 class Help:
-    """How much oftener readers of the text are right than readers of Q alone.
+    """How much oftener readers of the group that is tested are right than those of a control.
 
     Args:
         difference: of the shares of right answers, with the interval (95 %) that a bootstrap over
@@ -122,15 +120,15 @@ class Scores:
     Args:
         key: what was asked.
         groups: those that answered.
-        help: of the text, where both groups answered.
+        help: what is gained over each control, where the group that is tested and it answered.
     """
 
     key: Key
-    groups: dict[Group, GroupScores]
-    help: Help | None
+    groups: dict[str, GroupScores]
+    help: dict[str, Help]
 
 
-def score(key: Key, given: Mapping[Group, Answers]) -> Scores:
+def score(key: Key, given: Mapping[str, Answers]) -> Scores:
     """Scores what readers answered.
 
     Args:
@@ -138,35 +136,51 @@ def score(key: Key, given: Mapping[Group, Answers]) -> Scores:
         given: the answers of each group's readers, such as `ABCCBA`, `-` for none.
 
     Raises:
-        InputError: nobody answered, or somebody's answers are not one letter for each trial.
+        InputError: nobody answered, there is no such group, or somebody's answers are not one
+            letter for each trial.
     """
-    groups = {group: _group(key, given[group]) for group in GROUPS if given.get(group)}
+    known = key.design.groups
+    for group in given:
+        check_group(group, known)
+    groups = {group: _group(key, given[group]) for group in known if given.get(group)}
     if not groups:
         raise InputError("There are no answers.", "Give at least one reader's.")
-    text, q = (groups.get(group) for group in GROUPS)
-    found = None if text is None or q is None else _help(key, text, q)
+    tested = groups.get(key.design.tested)
+    controls = () if tested is None else tuple(groups)[1:]
+    found = {name: _help(key, groups[key.design.tested], groups[name]) for name in controls}
     return Scores(key, groups, found)
 
 
+def check_group(group: str, known: Iterable[str]) -> None:
+    """Checks that a study has a group of readers.
+
+    Raises:
+        InputError: it has not.
+    """
+    if group not in known:
+        cure = f"Its groups are {', '.join(known)}."
+        raise InputError(f"This study has no group '{group}'.", cure)
+
+
 def _group(key: Key, given: Answers) -> GroupScores:
-    total = len(key.answers)
+    total, chance = len(key.answers), key.design.chance
     for name, letters in given.items():
-        _check(name, letters, total)
+        _check(name, letters, key)
     right = {
         name: sum(a == b for a, b in zip(letters, key.answers, strict=True))
         for name, letters in given.items()
     }
     return GroupScores(
-        readers={name: Score.of(found, total) for name, found in right.items()},
-        overall=Score.of(sum(right.values()), total * len(given)),
+        readers={name: Score.of(found, total, chance) for name, found in right.items()},
+        overall=Score.of(sum(right.values()), total * len(given), chance),
         trials=tuple(dict(Counter(column)) for column in zip(*given.values(), strict=True)),
     )
 
 
-def _help(key: Key, text: GroupScores, q: GroupScores) -> Help:
-    ahead = text.rates(key.answers) - q.rates(key.answers)
+def _help(key: Key, tested: GroupScores, control: GroupScores) -> Help:
+    ahead = tested.rates(key.answers) - control.rates(key.answers)
     difference = bootstrap(ahead, rng=np.random.default_rng(0))
-    whole = np.rint(ahead * len(text.readers) * len(q.readers)).astype(int)
+    whole = np.rint(ahead * len(tested.readers) * len(control.readers)).astype(int)
     return Help(difference, sign_flip(whole.tolist()))
 
 
@@ -195,17 +209,20 @@ def read_key(path: Path) -> Key:
         InputError: it is no such file.
     """
     data = read_json(path)
-    is_key = isinstance(data, dict) and data.get("schema") == SCHEMA
-    if not is_key or not _is_answers(data.get("answers")) or not _are_trials(data):
+    schema = data.get("schema") if isinstance(data, dict) else None
+    design = next((of for of in DESIGNS if of.schema == schema), None)
+    if design is None or not _are_answers(data, design):
         raise InputError(
             f"'{path}' does not hold the answers of a kit.",
             "Give the answers.json that `trdlab study make` wrote.",
         )
-    texts = (tuple(told for part in _PARTS for told in trial[part]) for trial in data["trials"])
-    return Key(data["answers"], tuple(texts))
+    texts = (tuple(told for part in design.sentences for told in of[part]) for of in data["trials"])
+    return Key(data["answers"], tuple(texts), design)
 
 
-def read_given(path: Path, group: Group | None = None) -> dict[Group, Answers]:
+def read_given(
+    path: Path, group: str | None = None, design: Design = BLIND_READING
+) -> dict[str, Answers]:
     """Returns the answers of each group's readers from a file.
 
     It holds `{"text": {"Ada": "ABC"}, "q": {"Ben": "AB-"}}`, or the readers of one group.
@@ -213,15 +230,16 @@ def read_given(path: Path, group: Group | None = None) -> dict[Group, Answers]:
     Args:
         path: of a JSON file.
         group: whose answers are asked for; that of the readers where the file does not say, by
-            default readers of the text.
+            default that which is tested.
+        design: of the study.
 
     Raises:
         TrdlabError: it cannot be read, or is torn.
         InputError: it holds something else, or two readers of one name.
     """
     data = read_json(path)
-    grouped = isinstance(data, dict) and bool(data) and data.keys() <= GROUPS.keys()
-    given = data if grouped and _holds(data, dict) else {group or "text": data}
+    grouped = isinstance(data, dict) and bool(data) and data.keys() <= design.groups.keys()
+    given = data if grouped and _holds(data, dict) else {group or design.tested: data}
     if not all(isinstance(of, dict) and _holds(of, str) for of in given.values()):
         raise InputError(
             f"'{path}' does not hold what readers answered.",
@@ -265,24 +283,24 @@ def _unique(pairs: list[tuple[str, Any]]) -> None:
             raise InputError(f"{times} readers are called '{name}'.", "Give each its own name.")
 
 
-def _is_answers(answers: object) -> bool:
-    return isinstance(answers, str) and bool(answers) and set(answers) <= set(LETTERS)
-
-
-def _are_trials(data: Mapping[str, Any]) -> bool:
-    trials = data.get("trials")
+def _are_answers(data: Mapping[str, Any], design: Design) -> bool:
+    answers, trials = data.get("answers"), data.get("trials")
     return (
-        isinstance(trials, list)
-        and len(trials) == len(data["answers"])
-        and all(isinstance(of, dict) and of.keys() >= {*_PARTS} for of in trials)
+        isinstance(answers, str)
+        and bool(answers)
+        and set(answers) <= set(design.letters)
+        and isinstance(trials, list)
+        and len(trials) == len(answers)
+        and all(isinstance(of, dict) and of.keys() >= {*design.sentences} for of in trials)
     )
 
 
-def _check(name: str, letters: str, trials: int) -> None:
-    if wrong := [letter for letter in letters if letter not in (*LETTERS, NO_ANSWER)]:
+def _check(name: str, letters: str, key: Key) -> None:
+    known, trials = key.design.letters, len(key.answers)
+    if wrong := [letter for letter in letters if letter not in (*known, NO_ANSWER)]:
         raise InputError(
             f"'{wrong[0]}' in the answers of {name} names no agent.",
-            f"Write {', '.join(LETTERS)}, or {NO_ANSWER} for none.",
+            f"Write {', '.join(known)}, or {NO_ANSWER} for none.",
         )
     if len(letters) != trials:
         raise InputError(

@@ -1,6 +1,6 @@
 """The trials of a blind reading: what is printed of an agent at a choice, names left out."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from trdlab.study.candidates import CANDIDATES, LETTERS
 from trdlab.study.crossroads import TIME_AXIS, Way, draw_ways, draw_worths, model
 from trdlab.tabular import exact
 
-FEWEST, MOST = 3, 30
+MOST = 30
 _NAMES = ("action P", "action Q", "action R", "action S")
 
 
@@ -47,11 +47,8 @@ class Trial:
     @property
     def parts(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
         """The parts of the text, each below its heading."""
-        return (
-            (f"Why {self.action}, not {self.foil}", self.why),
-            (f"What to expect of {self.action}, which it takes", self.promise),
-            (f"What to expect of {self.foil}, the next best", self.instead),
-        )
+        told = self.why, self.promise, self.instead
+        return tuple(zip(headings(self.action, self.foil), told, strict=True))
 
 
 def draw_trials(seed: int, count: int = 12) -> tuple[Trial, ...]:
@@ -67,15 +64,26 @@ def draw_trials(seed: int, count: int = 12) -> tuple[Trial, ...]:
     Raises:
         InputError: the count is no multiple of three, or out of range.
     """
-    each, rest = divmod(count, len(CANDIDATES))
-    if rest or not FEWEST <= count <= MOST:
-        raise InputError(
-            f"There cannot be {count} trials.",
-            f"Give a multiple of {len(CANDIDATES)}, from {FEWEST} to {MOST}.",
-        )
+    each = times_each(count, len(CANDIDATES), MOST)
     rng = np.random.default_rng(seed)
     letters = rng.permutation([*LETTERS * each]).tolist()
     return tuple(_trial(letter, *draw(letter, rng)) for letter in letters)
+
+
+def times_each(count: int, candidates: int, most: int) -> int:
+    """Returns how often each candidate is asked about in so many trials.
+
+    Raises:
+        InputError: that is no whole number, or there are no trials or too many.
+
+    >>> times_each(12, candidates=3, most=30)
+    4
+    """
+    each, rest = divmod(count, candidates)
+    if rest or not 0 < count <= most:
+        cure = f"Give a multiple of {candidates}, from {candidates} to {most}."
+        raise InputError(f"There cannot be {count} trials.", cure)
+    return each
 
 
 def draw(letter: str, rng: np.random.Generator) -> tuple[Moment, dict[str, Way]]:
@@ -91,23 +99,46 @@ def draw(letter: str, rng: np.random.Generator) -> tuple[Moment, dict[str, Way]]
 def _trial(letter: str, moment: Moment, ways: Mapping[str, Way]) -> Trial:
     choice = moment.choice()
     assert choice.foil is not None  # all four ways differ
-    instead = moment.choice(choice.foil, choice.action)
     decimals = decimals_to_tell(moment.q_values)
+    why, promise, instead = printed(choice)
     return Trial(
         letter=letter,
         action=choice.action,
         foil=choice.foil,
         worth={name: number(moment.q_value(name), decimals) for name in _NAMES},
-        why=_printed(contrast.in_brief(choice), choice),
-        promise=_printed(forecast.forecast(choice), choice),
-        instead=_printed(forecast.forecast(instead), instead),
+        why=why,
+        promise=promise,
+        instead=instead,
         reason=" ".join(_described(name, ways[name]) for name in (choice.action, choice.foil)),
     )
 
 
-def _printed(claims: Iterable[Claim], choice: Choice) -> tuple[str, ...]:
+def printed(
+    choice: Choice, most: int | None = None
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Returns what is printed of a choice: why, and what to expect of its action and its foil.
+
+    Args:
+        choice: which has a foil.
+        most: sentences that tell what to expect of each; by default all.
+    """
+    instead = choice.moment.choice(*choice.orders[1])
+    one, other = (_sentences(forecast.forecast, of)[:most] for of in (choice, instead))
+    return _sentences(contrast.in_brief, choice), one, other
+
+
+def headings(action: str, foil: str) -> tuple[str, str, str]:
+    """Returns what stands above these."""
+    return (
+        f"Why {action}, not {foil}",
+        f"What to expect of {action}, which it takes",
+        f"What to expect of {foil}, the next best",
+    )
+
+
+def _sentences(tell: Callable[[Choice], Iterable[Claim]], choice: Choice) -> tuple[str, ...]:
     """Returns claims as sentences, read back and checked."""
-    texts = tuple(claim.sentence for claim in claims)
+    texts = tuple(claim.sentence for claim in tell(choice))
     check(" ".join(texts), [(CHOICES, choice)])
     return texts
 

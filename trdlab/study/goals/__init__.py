@@ -1,0 +1,1 @@
+"""Does it help? Readers see what one of four agents expects, and say which goal it has."""

@@ -7,6 +7,7 @@ from trdlab.agents.naming import find_agent
 from trdlab.atari import AtariEnvironments
 from trdlab.environments import GymEnvironments
 from trdlab.environments.paying import paying
+from trdlab.environments.screens import screened
 from trdlab.errors import InputError
 from trdlab.gridworld.env import GridworldEnv
 from trdlab.verbs.making import train
@@ -64,6 +65,19 @@ def test_copies_pay_the_same_and_idle_ones_nothing():
     assert copies.step(np.array([0, 1])).rewards.tolist() == [-1.0, -1.0]
     idle = environments.step(np.zeros(3, int), np.array([True, False, True])).rewards
     assert idle.tolist() == [-1.0, 0.0, -1.0]
+
+
+def test_where_people_look_on_they_are_paid_the_same():
+    for env in ("CartPole-v1", "trdlab/DroneGridworld-v0"):
+        drawn = screened(paying(GymEnvironments(env, 1, seed=0), {"step": -3.0}))
+        drawn.reset()
+        step = drawn.step(np.array([0]))
+        assert step.rewards.tolist() == [-3.0]
+        assert step.screens is not None
+    game = screened(paying(AtariEnvironments("Pong", 1, seed=0), {"step": -3.0}))
+    game.reset()
+    assert game.step(np.array([0])).rewards.tolist() == [-3.0]
+    assert game.screens.shape == (1, 210, 160, 3)
 
 
 @pytest.mark.parametrize(

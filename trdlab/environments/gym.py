@@ -72,7 +72,7 @@ class GymEnvironments:
         env_arguments: Mapping[str, Any] | None = None,
     ) -> None:
         self._source, self.num_envs = Source(env, env_arguments), num_envs
-        self.given = env, seed, dict(env_arguments or {})
+        self.given: tuple[EnvSource, int, dict[str, Any]] = env, seed, dict(env_arguments or {})
         self._envs = self._source.make(num_envs)
         self.name = self._source.name
         settings = {"env_id": self.name, "arguments": dict(env_arguments or {})}
@@ -179,13 +179,6 @@ class GymEnvironments:
         for env in self._envs:
             self._source.close(env)
 
-    def screened(self) -> "GymEnvironments":
-        """Returns others that do the same and are drawn, and closes these, which have not begun."""
-        from trdlab.environments.screens import drawn_as
-
-        self.close()
-        return drawn_as(self.given, self.num_envs, getattr(self._envs[0], "metadata", None))
-
     def _look_at(self, env: Any) -> None:
         """Notes what can be seen and done in an environment."""
         self._actions = Actions.of(env.action_space, self.name)
@@ -201,6 +194,7 @@ class GymEnvironments:
         spec, metadata = getattr(env, "spec", None), getattr(env, "metadata", None)
         self.time_limit: int | None = spec.max_episode_steps if spec else None
         self.frames_per_second: float | None = (metadata or {}).get("render_fps")
+        self.render_modes: tuple[str, ...] = tuple((metadata or {}).get("render_modes") or ())
 
     def _proved(self, env: int) -> Proof:
         """Returns what others of this kind show about copies of an environment."""

@@ -9,6 +9,7 @@ import numpy as np
 from trdlab.arrays import BoolArray, IntArray
 from trdlab.environments.outcomes import INFO, LIFE_LOST, Outcomes, Transition
 from trdlab.environments.protocol import CopyableEnvironments, Environments, Step
+from trdlab.environments.screens import screened
 from trdlab.errors import InputError, closest
 
 PAYS = "pays"
@@ -58,6 +59,10 @@ class Paying:
             if self._ended >= _ENOUGH:
                 self._outcomes.check_seen()
         return replace(step, rewards=rewards)
+
+    def screened(self) -> Environments:
+        """Returns others that pay the same, and show what people see (see `screened`)."""
+        return cast(Environments, Paying(screened(self._of), self._weights))
 
     def branch(self, which: IntArray, seed: int) -> CopyableEnvironments:
         """Returns copies that pay the same."""

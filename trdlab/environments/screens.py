@@ -74,28 +74,23 @@ def screened(environments: Environments) -> Environments:
     >>> drawn.reset().shape, drawn.screens.shape
     ((1, 4), (1, 400, 600, 3))
     """
-    if not hasattr(environments, "screened"):
-        return environments
-    made: Environments = environments.screened()
-    return made
+    if hasattr(environments, "screened"):  # games, and what wraps others
+        made: Environments = environments.screened()
+        return made
+    return _drawn_as(environments) if isinstance(environments, GymEnvironments) else environments
 
 
-def drawn_as(given: tuple[Any, int, dict[str, Any]], count: int, metadata: Any) -> GymEnvironments:
-    """Returns environments made of what others were made of, such that they draw if they can.
-
-    Args:
-        given: an id, an environment or a function, the seed, and what to make those of an id with.
-        count: how many.
-        metadata: of those others: it says whether they can draw.
-    """
+def _drawn_as(of: GymEnvironments) -> GymEnvironments:
+    """Returns environments made of what others were made of, such that they draw if they can."""
+    of.close()
     if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
         os.environ.setdefault(
             "SDL_VIDEODRIVER", "dummy"
         )  # else SDL complains that it has no screen
-    env, seed, arguments = given
-    if isinstance(env, str) and MODE in (metadata or {}).get("render_modes", ()):
+    env, seed, arguments = of.given
+    if isinstance(env, str) and MODE in of.render_modes:
         arguments = {"render_mode": MODE} | arguments
-    return DrawnEnvironments(env, count, seed=seed, env_arguments=arguments)
+    return DrawnEnvironments(env, of.num_envs, seed=seed, env_arguments=arguments)
 
 
 def _drawn(env: Any) -> Frames | None:

@@ -11,26 +11,30 @@ _EACH = (
 )
 _RULES = (
     "In the game a drone moves over a map, one cell in each step: up, down, left or right. With a "
-    f"chance of {100 * SLIP:g} % it slips to one side instead. It cannot enter walls.",
+    f"chance of {100 * SLIP:g} % it slips to the left or to the right of where it wanted to go. It "
+    "can enter triangles, but no walls. It starts on the cell with the H.",
     "A circle or a square is gone once the drone was there; its outline is left. Triangles stay. "
-    "The flag ends the episode, and pays all four agents a little.",
+    "The flag ends the episode, and pays all four agents the same.",
 )
 _UNITS = (
-    "The largest reward that this agent has received counts as 1. What is below zero is a cost."
+    "Amounts are told such that the largest reward of this agent is 1. What is below zero is a "
+    "cost."
 )
 _MOMENTS = "A trial shows moments of one episode, and what the agent does there."
 _BARS = (
     "Bars tell what it expects on average at each step from now: first of the action that it "
-    "takes, then of the next best one. A bar below zero is an expected cost. A reward counts a "
-    "little less for each step that it comes later."
+    "takes, then of the next best one. What may come or not has a lower bar, by its chance. A bar "
+    "below zero is an expected cost. A reward counts a little less for each step that it comes "
+    "later."
 )
 _SALIENCY = (
-    "Colours tell what that which it expects depends on. Without what lies on dark blue it would "
-    "expect less, without what lies on red it would expect more."
+    "Colours show what the reward that the agent expects depends on. Without a thing on dark blue "
+    "it would expect less reward, without a thing on red it would expect more."
 )
 _CLIPS = (
     f"Clips come from {EPISODES} episodes that the agent has played. They show moments when reward "
-    "really came to it: just before, when it came, and just after."
+    "really came to it: just before, when it came, and just after. Each row stands for all moments "
+    "of one kind."
 )
 _OF_GROUP = {
     "report": (_MOMENTS, _BARS, _SALIENCY, _CLIPS, _UNITS),

@@ -67,8 +67,11 @@ def test_the_answer_comes_first_and_the_bars_say_when(browser, drone):
     assert visit.text("#says").startswith("Down gives more immediate rewards: 2.71")
     assert visit.text("#where") == "Step 0 of 4."
     assert visit.page.locator("#bars .bar-one:not(.pale)").count() == 3
-    assert visit.text("#look-when") == "The largest bar: 1 step later"
-    assert "4 were followed by a reward 1 step later" in visit.text("#look-alike")
+    assert visit.text("#look-when") == "The largest step: 1 step later"
+    assert (
+        "4 of 4 forecasts as high as this one were followed by a reward 1 step later"
+        in visit.text("#look-alike")
+    )
     assert visit.page.locator("#look-clips canvas").count() >= 4
     assert "A reward of 1 came 4 times from coin." in visit.text("#gallery")
     assert visit.faults == []
@@ -113,7 +116,7 @@ def test_by_keyboard_alone(browser, drone):
     assert visit.text("#look-when") == "2 steps later"
     assert visit.text("#where") == "Step 0 of 4."
     keys.press("Escape")
-    assert visit.text("#look-when") == "The largest bar: 1 step later"
+    assert visit.text("#look-when") == "The largest step: 1 step later"
     keys.press(" ")
     assert visit.text("#play") == "Pause"
     visit.page.get_by_text("Step 4 of 4.").wait_for()
@@ -127,7 +130,7 @@ def test_pointing_at_a_bar_says_what_such_rewards_looked_like(browser, drone):
     assert visit.text("#look-when") == "3 steps later"
     assert "down 0.86" in visit.text("#look-what")
     visit.page.hover("h1")
-    assert visit.text("#look-when") == "The largest bar: 1 step later"
+    assert visit.text("#look-when") == "The largest step: 1 step later"
 
 
 @pytest.mark.parametrize("width", [320, 390])
@@ -200,7 +203,7 @@ def test_where_it_looks_is_shown_for_the_bar_that_is_pointed_at(browser, tmp_pat
     out = trdlab.report(f"pretrained:{game}", out=tmp_path / "b.html", **how)
     visit = Visit(browser, out)
     assert visit.page.locator("#looks").is_hidden()
-    assert visit.text("#look-where") == "Point at a bar to see where the agent looks for it."
+    assert visit.text("#look-where") == "Tap or point at a bar to see where the agent looks for it."
     visit.page.hover("[data-component='5']")
     visit.page.locator("#looks").wait_for()
     visit.page.wait_for_timeout(300)  # until the maps are unpacked
@@ -211,7 +214,8 @@ def test_where_it_looks_is_shown_for_the_bar_that_is_pointed_at(browser, tmp_pat
     other = next(i for i in range(9) if i != page["usual"][page["step"]][0])
     visit.page.select_option("#action", str(other))
     visit.page.hover("[data-component='4']")
-    assert visit.text("#look-where") == "Where it looks is kept of what it does."
+    known = "Where it looks is known only of the action that it usually takes."
+    assert visit.text("#look-where") == known
     assert visit.faults == []
 
 

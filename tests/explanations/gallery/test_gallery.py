@@ -54,13 +54,14 @@ def test_what_followed_forecasts_that_are_alike():
     axis = TimeAxis(0.5, 2)
     gallery = gallery_of([forecasts([0.0, 1.0, 0.0, 1.0, 0.0, 0.0], axis)], Reel())
     told = {key: claim.sentence for key, claim in likeness(gallery).items()}
-    assert told[0, 3] == "Of 2 recorded forecasts as high as this one, 2 were followed by a " + (
-        "reward at once."
+    assert told[0, 3] == (
+        "In 1 episode, 2 of 2 forecasts as high as this one were followed by a reward at once."
     )
-    assert told[0, 0] == "Of 4 recorded forecasts as low as this one, none was followed by a " + (
-        "reward at once."
+    assert told[0, 0] == (
+        "In 1 episode, none of 4 forecasts as small as this one was followed by a reward at once."
     )
-    assert told[1, 3] == "Of 2 recorded forecasts as high as this one, 2 were followed by a " + (
+    assert told[1, 3] == (
+        "In 1 episode, 2 of 2 forecasts as high as this one were followed by a "
         "reward 1 step later, give or take a step."
     )
     # step 1 is followed by the reward of step 1 itself, and step 3 likewise: a step before

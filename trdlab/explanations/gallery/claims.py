@@ -2,12 +2,18 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from trdlab.explanations.gallery.gallery import Gallery
 from trdlab.explanations.rules import Claim, Fields, Form, Found, Language, every
 from trdlab.explanations.words import forms_of
 from trdlab.formatting import said
 
-_SO_MANY = "Of {moments:count} recorded forecasts {like:text}"
+_OF = "of {moments:count} forecasts {like:text}"
+
+
+_SIZES = {1: "high", 0: "small", -1: "low"}
+"""How a forecast is called, by the sign of its level."""
 
 
 def _forms(gallery: Gallery) -> dict[str, Form]:
@@ -66,12 +72,17 @@ def likeness(gallery: Gallery) -> dict[tuple[int, int], Claim]:
             "The one recorded forecast {like:text} was not followed by {kind:text} "
             "{component:when}."
         ),
-        "none-followed": f"{_SO_MANY}, none was followed by {{kind:text}} {{component:when}}.",
+        "none-followed": (
+            f"In {{episodes:episodes}}, none {_OF} was followed by {{kind:text}} "
+            "{component:when}."
+        ),
         "one-followed": (
-            f"{_SO_MANY}, 1 was followed by {{kind:text}} {{component:when}}{{slack:text}}."
+            f"In {{episodes:episodes}}, 1 {_OF} was followed by {{kind:text}} {{component:when}}"
+            "{slack:text}."
         ),
         "some-followed": (
-            f"{_SO_MANY}, {{followed:count}} were followed by {{kind:text}} {{component:when}}"
+            f"In {{episodes:episodes}}, {{followed:count}} {_OF} were followed by {{kind:text}} "
+            "{component:when}"
             "{slack:text}."
         ),
     }
@@ -82,9 +93,10 @@ def followed(gallery: Gallery) -> Iterator[Found]:
         fields: Fields = {
             "component": of.component,
             "level": of.level,
+            "episodes": len(gallery.recorded),
             "moments": of.moments,
             "followed": of.followed,
-            "like": f"as {'high' if of.level else 'low'} as this one",
+            "like": f"as {_SIZES[int(np.sign(of.level))]} as this one",
             "kind": "a cost" if of.level < 0 else "a reward",
             "slack": ", give or take a step" if gallery.slack(of.component) else "",
         }

@@ -23,6 +23,7 @@ from trdlab.explanations.moment.moment import Moment
 from trdlab.explanations.moment.telling import in_brief
 from trdlab.explanations.rules import plain_data
 from trdlab.explanations.words import when_of
+from trdlab.formatting import said
 from trdlab.rollouts.reel import Reel
 from trdlab.show.data import axis_data
 from trdlab.show.document import document
@@ -76,6 +77,7 @@ class Material:
 def html(material: Material) -> str:
     """Returns the page."""
     explained, page = material.explained, document(material.explained)
+    episode = material.take.recorded.episode
     script, style = (_read(f"page.{kind}") for kind in ("js", "css"))
     lead, trusted = _lead(material), _trusted_in_short(material)
     beside = (lead, trusted, *material.told.sentences_of(explained.step))
@@ -92,8 +94,11 @@ def html(material: Material) -> str:
         trusted=trusted,
         answer=answer[:MOST_ANSWERS],
         names=explained.agent.action_names,
-        steps=len(material.take.recorded.episode),
+        steps=len(episode),
         seed=explained.seed,
+        score=said(float(episode.rewards.sum()), 3),
+        is_over=episode.terminated,
+        has_clips=bool(material.take.recorded.pictures and material.gallery.came),
         step=explained.step,
         key=[(place(claim), claim.sentence) for claim in material.story.moments],
         start=[claim.sentence for claim in material.story.start],

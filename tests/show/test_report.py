@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -228,6 +229,124 @@ def test_other_time_axes(browser, tmp_path, how):
     visit.page.click("#numbers summary")
     visit.page.locator("#table td").first.wait_for()
     assert visit.page.locator("#table tbody tr").count() == how["horizon"] + 1
+    assert visit.faults == []
+
+
+class Toll(gym.Env):
+    """Pays 1, costs 1, or does nothing, as its action says."""
+
+    observation_space, action_space = gym.spaces.Box(0, 99, (1,)), gym.spaces.Discrete(3)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.steps = 0
+        return np.float32([0]), {}
+
+    def step(self, action):
+        self.steps += 1
+        return np.float32([self.steps]), (1.0, -1.0, 0.0)[action], False, False, {}
+
+
+class Posted:
+    """Expects of each action the same at every step."""
+
+    time_axis, future = TimeAxis(0.5, 2), Future("nobody")
+
+    def decompose(self, seen: np.ndarray) -> RewardDecomposition:
+        rows = [[0.5, 0.5, 0.0], [-2.0, 0.0, 4.0], [0.0, 0.0, 1.001]]
+        return RewardDecomposition(np.tile(rows, (len(seen), 1, 1)), self.time_axis)
+
+
+@pytest.fixture(scope="module")
+def toll(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("reports") / "toll.html"
+    agent = trdlab.agent(
+        Posted(),
+        env=Toll,
+        policy=lambda seen: np.tile([0.6, 0.2, 0.2], (len(seen), 1)),
+        action_names=["earn", "pay", "rest"],
+    )
+    return trdlab.report(agent, out=out, episodes=0, others=0, max_steps=30, step=0)
+
+
+def test_what_is_drawn_and_what_is_usual_are_told_apart(browser, toll):
+    visit, page = Visit(browser, toll), held(toll)
+    name = page["actions"]
+    for taken in range(3):
+        visit.page.fill("#step", str(page["taken"].index(taken)))
+        first = f"{'what it does' if taken == 0 else 'usual action'}: earn"
+        assert visit.text("#action option >> nth=0") == first
+        here = "" if taken == 0 else " (taken here)"
+        assert visit.text(f"#foil option >> nth={taken + 1}") == name[taken] + here
+        said = (
+            "The agent takes earn (chosen with 60 %)."
+            if taken == 0
+            else f"Here it takes {name[taken]}, by a random draw; usually earn (60 %)."
+        )
+        assert visit.text("#doing").startswith(said)
+    # pay is worth more, and is not called the next best
+    assert visit.text("#foil option >> nth=0") == "another action: pay"
+    prefers = "It takes what its policy prefers. Of these values, that of pay is larger by 1."
+    assert prefers in visit.text("#more")
+    visit.page.select_option("#foil", "0")
+    visit.page.select_option("#action", "0")
+    assert visit.text("#says") == "Both are earn: the bars show it alone."
+    assert visit.page.locator("#bars .bar-other").count() == 0
+    assert visit.text("#legend").startswith("earn: 1 in all")
+    visit.page.select_option("#action", "2")
+    assert visit.text("#legend").startswith("rest: 1.001 in allearn: 1 in all")
+    assert visit.text("#look-when") == "No step stands out"
+    assert visit.page.locator("#look-clips canvas").count() == 0
+    visit.page.fill("#step", "27")
+    assert "The recording ends 2 steps later" not in visit.text("#doing")
+    visit.page.fill("#step", "28")
+    assert "The recording ends 1 step later: what came then is not known." in visit.text("#doing")
+    assert visit.faults == []
+
+
+def test_costs_have_the_scale_of_rewards_and_what_came_is_marked(browser, toll):
+    visit, page = Visit(browser, toll), held(toll)
+    numbers = visit.page.locator("#bars text").all_text_contents()
+    assert {"0.5", "−0.5", "−2", "4"} <= set(numbers)
+    assert visit.page.locator("#bars .gap").count() == 2
+    signs = np.sign(page["rewards"]).tolist()
+    for action in (0, 1):
+        step = page["taken"].index(action)
+        visit.page.fill("#step", str(step))
+        came = [signs[step] > 0, signs[step + 1] > 0, max(signs[step + 2 :]) > 0]
+        cost = [signs[step] < 0, signs[step + 1] < 0, min(signs[step + 2 :]) < 0]
+        assert visit.page.locator("#bars .paid").count() == sum(came)
+        assert visit.page.locator("#bars .cost").count() == sum(cost)
+        legend = f"what really came in this episode, after {page['actions'][action]}"
+        assert legend in visit.text("#legend")
+    visit.page.fill("#step", str(page["taken"].index(2)))
+    assert visit.page.locator("#bars .paid, #bars .cost").count() == 0  # rest is not shown
+    for kind, sign in (("paid", 1), ("cost", -1)):
+        assert visit.page.locator(f"#line .{kind}").count() == page["rewards"].count(sign)
+    assert f"score {sum(page['rewards']):.3g}" in visit.text("dl")
+    assert visit.faults == []
+
+
+def test_a_chosen_bar_and_the_address_are_let_go(browser, drone):
+    visit = Visit(browser, drone)
+    visit.page.click("[data-component='2']")
+    visit.page.hover("h1")
+    assert visit.text("#look-when") == "2 steps later"
+    assert "down 0.9, up 0, discounted. Without the discount: 1, 0." in visit.text("#look-what")
+    assert "With down, the chance of a reward then is 100 %." in visit.text("#look-what")
+    visit.page.keyboard.press("Escape")
+    assert visit.text("#look-when") == "The largest step: 1 step later"
+    visit.page.click("[data-component='2']")
+    visit.page.hover("h1")
+    visit.page.click(".key a")
+    assert visit.text("#where") == "Step 3 of 4."
+    assert visit.text("#look-when") != "2 steps later"
+    assert visit.page.evaluate("location.hash") == "#step-3"
+    visit.page.keyboard.press("End")
+    assert visit.text("#doing").endswith("The episode ends here.")
+    assert visit.page.evaluate("location.hash") == ""
+    framed = visit.page.locator("#strip .here")
+    assert framed.get_attribute("aria-label") == "Go to step 4"
     assert visit.faults == []
 
 

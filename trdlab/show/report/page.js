@@ -406,7 +406,7 @@
     const bars = amounts(1);
     let text = `Expected reward: ${shown.map((a, k) => `${D.actions[a]} ${bars[k]}`).join(", ")}`;
     const later = i > 0 && i < N && D.time_axis.width === 1 && D.time_axis.gamma > 0 ? amounts(D.time_axis.gamma ** -i) : bars;
-    text += later.join() === bars.join() ? "." : `, discounted; ${later.join(" and ")} when it comes.`;
+    text += later.join() === bars.join() ? "." : `, discounted. Without the discount: ${later.join(", ")}.`;
     const what = scale.low < 0 ? "a reward or a cost" : "a reward";
     if (D.chances && i < N && D.chances[t][one]) text += ` With ${D.actions[one]}, the chance of ${what} then is ${percent(D.chances[t][one][i])}.`;
     const known = judged(t, one), off = known ? known.off_by[i] : null;
@@ -459,8 +459,9 @@
     const canvas = svg("svg", { viewBox: `0 0 ${width} ${height}` });
     canvas.append(svg("line", { class: "grid", x1: 0, x2: width, y1: y(0), y2: y(0) }));
     canvas.append(svg("polyline", { class: "value", points: values.map((v, t) => `${x(t).toFixed(1)},${y(v).toFixed(1)}`).join(" ") }));
+    const half = Math.min(5, Math.max(1, width / (4 * D.rewards.filter(Boolean).length))); // many are narrow
     D.rewards.forEach((reward, t) => {
-      if (reward) canvas.append(mark(reward, x(t), bottom + 5, Math.min(5, Math.max(1, width / T / 2))));
+      if (reward) canvas.append(mark(reward, x(t), bottom + 5, half));
     });
     D.key.forEach((t, k) => {
       canvas.append(svg("circle", { class: "mark", cx: x(t), cy: 11, r: 9 }));

@@ -240,9 +240,9 @@
     for (let i = 0; i < N; i += unit) {
       if (N && at(i) + 20 > at(N) - 22) break;
       const label = i === 0 ? "now" : `+${i * D.time_axis.width}`;
-      canvas.append(svg("text", { x: at(i) + each / 2, y: height - 6, "text-anchor": "middle" }, label));
+      canvas.append(svg("text", { x: at(i) + each / 2, y: height - 8, "text-anchor": "middle" }, label));
     }
-    canvas.append(svg("text", { x: Math.min(at(N) + each / 2, width - 16), y: height - 6, "text-anchor": "middle" }, N ? "later" : "all"));
+    canvas.append(svg("text", { x: Math.min(at(N) + each / 2, width - 16), y: height - 8, "text-anchor": "middle" }, N ? "later" : "all"));
     const focus = component();
     canvas.append(svg("rect", { class: isNone(t) ? "chosen none" : "chosen", x: at(focus), y: top - 6, width: each, height: bottom - top + 8, rx: 2 }));
     for (let i = 0; i <= N; i++) {
@@ -323,7 +323,7 @@
     if (grounds.has("bad")) add("bad", "no better than a guess");
     if (shown.includes(D.taken[t]) && came(t).flat().length) {
       const signs = new Set(came(t).flat()), words = { "1": ["paid", "▲"], "-1": ["cost", "▼"] };
-      const marks = [1, -1].filter((sign) => signs.has(sign)).map((sign) => el("b", { className: words[sign][0], textContent: words[sign][1] }));
+      const marks = [1, -1].filter((sign) => signs.has(sign)).map((sign) => el("span", { className: words[sign][0], textContent: words[sign][1] }));
       parts.push(el("span", {}, ...marks, ` what really came in this episode, after ${D.actions[D.taken[t]]}`));
     }
     byId("legend").replaceChildren(...parts);

@@ -303,8 +303,8 @@ checks(gradcam)
 # %% [markdown]
 # The first check is passed: this map depends on what was learned. The second one is *failed*. The
 # numbers are even below 0: where the map is strong, hiding changes rather less than elsewhere. Look
-# for it in the picture. In the map the score and the frame shine, where next to nothing changes
-# when they are hidden. In the wall much changes, and there the map is dark.
+# for it in the picture. At the score the map shines, and hiding that changes next to nothing. In
+# the wall of bricks hiding changes most, and there the map is nearly dark.
 #
 # **So do not show this map.** It is not "a little uncertain". It says "here", and hiding says
 # "rather elsewhere". Nothing else speaks for it, as the parcels did. Whoever sees it will believe
@@ -325,8 +325,8 @@ checks(hirescam)
 hirescam.plot()
 
 # %% [markdown]
-# Both checks are passed, for near and for far. For near, the brightest place is at the ball; for
-# far, the map is strong at the ball and at the paddle, too. The score is dark now.
+# Both checks are passed, for near and for far. For near, the brightest place is just below the
+# ball; for far, the map is strong there and at the paddle, too. The score is dark now.
 #
 # The same in words:
 

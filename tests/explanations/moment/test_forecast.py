@@ -127,6 +127,20 @@ def test_nothing_is_forecast_that_cannot_be_trusted():
     assert kinds == {"first-expected"}  # and no peak at t+4, nor a share beyond t+5
 
 
+@pytest.mark.parametrize(("chance", "told"), [(0.0, 0), (0.0025, 0), (0.3, 1)])
+def test_an_action_that_is_hardly_ever_taken_is_judged_where_it_was_forced(chance, told):
+    """Of b, drawn at random now and then, what was judged of a says nothing."""
+    axis, row = TimeAxis(GAMMA, 3), [0.0, 0.9, 0.0, 0.0]
+    of = moment(
+        [row, row],
+        calibration=trusted(axis, 3),
+        foils=trusted(axis, 0),
+        policy=np.array([1.0 - chance, chance]),
+    )
+    assert len(forecast(of.choice("a"))) > 0
+    assert bool(forecast(of.choice("b"))) == bool(told)
+
+
 def test_small_components_of_what_was_learned_are_no_first_reward():
     row = [0.03, -0.04, 0.03, 1.0, 0.02, 0.5]
     (first,) = of_kind(one(row), "first-expected")

@@ -14,6 +14,7 @@ from trdlab.errors import InputError, closest
 from trdlab.estimator import Estimator, Future, Outlook
 from trdlab.explanations.rules import Language
 from trdlab.explanations.words import forms_of
+from trdlab.formatting import DOUBT
 
 if TYPE_CHECKING:
     from trdlab.explanations.calibration.calibration import Calibration
@@ -83,7 +84,7 @@ class Moment:
         uncertainty: spread and survival, where they are known.
         outlook: what else was learned to be expected, where that is so.
         calibration: how good such forecasts are, if that has been judged.
-        foils: the same of first actions that the policy does not take.
+        foils: the same of first actions that the policy does not take, or hardly ever.
         seconds_per_step: how long a step takes as people play, if that is known.
         forbidden: the names of actions that cannot be taken here; they are none of the A.
         possible: the least and the most that a component can be, as far as known.
@@ -159,8 +160,14 @@ class Moment:
 
     def judged(self, action: str) -> "Calibration | None":
         """Returns how good forecasts of such an action are, if that has been judged."""
-        is_taken = self.policy is None or self.policy[self.index(action)] > 0.0
-        return self.calibration if is_taken or self.foils is None else self.foils
+        return self.calibration if self.is_own(action) or self.foils is None else self.foils
+
+    def is_own(self, action: str) -> bool:
+        """Returns whether the policy takes an action often enough to be judged by what it does.
+
+        What comes of one that is only drawn at random is hardly ever among that.
+        """
+        return self.policy is None or bool(self.policy[self.index(action)] >= DOUBT)
 
     def total(self, action: str) -> float:
         """Returns the undiscounted total of one action, NaN where none exists or is known."""

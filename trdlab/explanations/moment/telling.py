@@ -45,8 +45,9 @@ def _why(choice: Choice) -> str:
     if choice.foil is None:
         return f"Why {choice.action}"
     moment = choice.moment
-    is_taken = moment.policy is None or moment.policy[moment.index(choice.action)] > 0.0
-    if is_taken and moment.q_value(choice.action) >= moment.q_value(choice.foil):
+    if moment.is_own(choice.action) and moment.q_value(choice.action) >= moment.q_value(
+        choice.foil
+    ):
         return f"Why {choice.action}, not {choice.foil}"
     return f"How {choice.action} differs from {choice.foil}"
 

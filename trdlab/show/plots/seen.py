@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 from trdlab.arrays import FloatArray
 from trdlab.explanations.moment.moment import Choice, Moment
 from trdlab.explanations.moment.steps import LEAST_DISCOUNT
-from trdlab.formatting import DOUBT
 from trdlab.show.plots import style
 from trdlab.time_axis import axis_title, step_label
 
@@ -88,8 +87,7 @@ def _trusted(moment: Moment, action: str) -> int:
     """
     if moment.is_exact:
         return moment.time_axis.horizon
-    is_own = moment.policy is None or bool(moment.policy[moment.index(action)] >= DOUBT)
-    judged = moment.calibration if is_own else moment.foils
+    judged = moment.calibration if moment.is_own(action) else moment.foils
     return 0 if judged is None else judged.trust.components
 
 

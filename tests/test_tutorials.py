@@ -50,6 +50,10 @@ SOLUTIONS = {
     "7.4": "[0.6, 0.5, 0.3, -0.1, 0.2, 0.1].index(-0.1) - 1",
     "8.1": "1 - 25 / 100",
     "8.2": "0.368",
+    "9.1": "0.9**2 * 0.6 - 0.9**2 * 0.5",
+    "9.2": "0.03",
+    "9.3": "-0.2",
+    "9.4": "[3]",
 }
 
 
@@ -103,6 +107,7 @@ def test_lessons_are_found() -> None:
         "06_debug_an_agent",
         "07_explain_your_own",
         "08_from_a_teacher",
+        "09_which_pixels",
     ]
 
 
@@ -257,6 +262,39 @@ def test_seventh_lesson_says_what_its_numbers_show() -> None:
     )
     assert len(set(copies)) == 1
     assert len(set(stumbling)) > 5
+
+
+def test_ninth_lesson_says_what_its_numbers_show() -> None:
+    printed = printed_by(LESSONS[8])
+
+    def column(table: int, entry: str) -> tuple[float, ...]:
+        row = rf"^ *{entry} +(-?\d\.\d{{3}}) +(-?\d\.\d{{3}})$"
+        near_and_far = re.findall(row, printed, re.MULTILINE)[table]
+        return tuple(map(float, near_and_far))
+
+    hiding, pushing, walking, of_network, added = range(5)
+    assert column(pushing, "belt 1") == (0.0, 0.0)
+    assert column(pushing, "belt 5") == (0.0, 0.590)
+    assert column(walking, "belt 1") == (0.225, 0.0)
+    assert column(walking, "belt 5") == (0.0, -0.118)
+    others = [f"belt {k}" for k in (0, 2, 3, 4, 6, 7)] + ["noise 0", "noise 1"]
+    for table, most in ((hiding, 0.0), (of_network, 0.06), (added, 0.06)):
+        assert column(table, "belt 1")[0] > 0.15
+        assert column(table, "belt 5")[1] < -0.08
+        assert all(abs(of) <= most for entry in others for of in column(table, entry))
+
+    sums = re.findall(r" = (\S+)\n +all entries add (\S+)$", printed, re.MULTILINE)
+    assert len(sums) == 4
+    for difference, total in sums:
+        assert abs(float(difference) - float(total)) < 0.002
+
+    found = re.findall(r"(near|far): new weights (\w+) \(.*\), hiding (\w+) \((.*)\)", printed)
+    gradcam, hirescam = found[:2], found[2:]
+    assert [of[1:3] for of in gradcam] == [("good", "bad")] * 2
+    assert all(float(of[3]) < 0.0 for of in gradcam)
+    assert [of[1:3] for of in hirescam] == [("good", "good")] * 2
+    of_the_belt = printed[: printed.index("near: new weights")]
+    assert "Do not believe" in of_the_belt  # a false alarm: the lesson says why
 
 
 @pytest.mark.parametrize("name", exercise.EXERCISES)

@@ -17,7 +17,7 @@ from trdlab.environments.arguments import parse_arguments, say_arguments
 from trdlab.environments.batches import Make
 from trdlab.environments.gym import GymEnvironments
 from trdlab.environments.interface import Interface
-from trdlab.environments.paying import PAYS, paying
+from trdlab.environments.paying import paying, split_pays
 from trdlab.environments.sources import EnvSource
 from trdlab.errors import InputError
 from trdlab.rollouts.branches import Effort
@@ -161,8 +161,7 @@ def find_place(
         words = (*env_arguments, *(say_arguments({name: value}) for name, value in more.items()))
         place = place_of(TrainSettings("atari", source, env_arg=words))
         return replace(place, env_arguments=tuple(env_arguments))
-    arguments = parse_arguments(env_arguments)
-    pays = arguments.pop(PAYS, None)
+    arguments, pays = split_pays(parse_arguments(env_arguments))
 
     def made(num_envs: int, seed: int) -> Environments:
         return paying(GymEnvironments(source, num_envs, seed=seed, env_arguments=arguments), pays)

@@ -7,6 +7,7 @@ from typing import Any, cast
 import numpy as np
 
 from trdlab.arrays import BoolArray, IntArray
+from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.outcomes import INFO, LIFE_LOST, Outcomes, Transition
 from trdlab.environments.protocol import CopyableEnvironments, Environments, Step
 from trdlab.environments.screens import screened
@@ -81,7 +82,23 @@ def has_own_reward(env_arguments: Sequence[str]) -> bool:
     >>> has_own_reward(['pays={"step":-1}'])
     True
     """
-    return any(word.startswith(f"{PAYS}=") for word in env_arguments)
+    return split_pays(parse_arguments(env_arguments))[1] is not None
+
+
+def split_pays(arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, float] | None]:
+    """Returns the arguments that an environment takes itself, and what pays, if that is said.
+
+    Only names with weights say it: an environment may have an argument of that name, too.
+
+    >>> split_pays({"slip": 0.1, "pays": {"step": -1}})
+    ({'slip': 0.1}, {'step': -1})
+    >>> split_pays({"pays": 3})
+    ({'pays': 3}, None)
+    """
+    pays = arguments.get(PAYS)
+    if not isinstance(pays, dict):
+        return dict(arguments), None
+    return {name: value for name, value in arguments.items() if name != PAYS}, pays
 
 
 def checked_weights(weights: Any) -> dict[str, float]:

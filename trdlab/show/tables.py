@@ -1,14 +1,16 @@
 """Tables of a page: what each action is worth, as the cells that text and HTML lay out."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from trdlab.arrays import FloatArray, difference
 from trdlab.explanations.moment.moment import Choice, Moment
-from trdlab.explanations.saliency.saliency import Entries, Saliency
 from trdlab.formatting import amount, decimals_for, decimals_to_tell, number
+
+if TYPE_CHECKING:  # gridworlds do without it
+    from trdlab.explanations.saliency.saliency import Saliency
 
 Row = tuple[str, ...]
 _MOST_ENTRIES = 12  # of a table of what they add
@@ -71,11 +73,13 @@ def action_table(choice: Choice) -> Table | None:
     return Table(heading, tuple(rows), sides, styles, axis.num_components)
 
 
-def entry_table(saliency: Saliency) -> Table | None:
+def entry_table(saliency: "Saliency") -> Table | None:
     """Returns a row for each entry that counts most: what it adds to near and to far reward.
 
     There is none of images.
     """
+    from trdlab.explanations.saliency.saliency import Entries
+
     of, groups = saliency.of, saliency.told
     if not isinstance(of, Entries):
         return None

@@ -15,7 +15,7 @@ from trdlab.deep.settings import Kind, TrainSettings, checked
 from trdlab.environments import Environments
 from trdlab.environments.arguments import parse_arguments
 from trdlab.environments.interface import Interface
-from trdlab.environments.paying import PAYS, paying
+from trdlab.environments.paying import paying, split_pays
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.files import check_small_text, free_name
@@ -174,8 +174,7 @@ def make_environments(
 
 
 def _made(settings: TrainSettings, num_envs: int | None, seed: int | None) -> Environments:
-    arguments = parse_arguments(settings.env_arg)
-    pays = arguments.pop(PAYS, None)
+    arguments, pays = split_pays(parse_arguments(settings.env_arg))
     count = settings.num_envs if num_envs is None else num_envs
     seed = settings.seed if seed is None else seed
     if settings.kind == "atari":

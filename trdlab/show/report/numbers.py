@@ -1,15 +1,19 @@
-"""Many numbers as JSON that is short, and exact where it has to be."""
+"""Many numbers in few characters, as they stand in the JSON of a page."""
 
-import math
-from collections.abc import Iterable
+import sys
+from base64 import b64encode
+from typing import Any
 
 import numpy as np
 
 from trdlab.arrays import FloatArray
 
+MOST = 65_534
+"""Of a share: 0 to 1 are told as 0 to so much. One more is no number."""
+
 
 def is_single(values: FloatArray) -> bool:
-    """Returns whether numbers are those of single precision, and need only its digits.
+    """Returns whether numbers are those of single precision, and need only half the room.
 
     >>> is_single(np.float64(np.float32(0.1))), is_single(np.float64(0.1))
     (True, False)
@@ -17,42 +21,28 @@ def is_single(values: FloatArray) -> bool:
     return bool(np.array_equal(values, np.float32(values), equal_nan=True))
 
 
-def exactly(values: FloatArray, *, single: bool) -> str:
-    """Returns an array as JSON with the fewest digits that tell its numbers; NaN is null.
+def packed(values: FloatArray) -> dict[str, Any]:
+    """Returns an array to the bit: its shape, its type, and its bytes as base64.
 
-    Args:
-        values: of any shape.
-        single: whether the numbers are read as those of single precision.
-
-    >>> exactly(np.float64(np.float32([0.1, 2.0])), single=True)
-    '[0.1,2]'
-    >>> exactly(np.array([[0.1], [np.nan]]), single=False)
-    '[[0.1],[null]]'
+    >>> packed(np.array([[1.0], [np.nan]]))
+    {'shape': [2, 1], 'type': 'single', 'bytes': 'AACAPwAAwH8='}
     """
-    return _nested(values.shape, iter(_digits(values.astype(np.float32 if single else np.float64))))
+    single = is_single(values)
+    kind = np.float32 if single else np.float64
+    return _packed(values.astype(kind), "single" if single else "double")
 
 
-def nearly(values: FloatArray, digits: int = 3) -> str:
-    """Returns an array as JSON, rounded such that its largest number has so many digits.
+def packed_shares(values: FloatArray) -> dict[str, Any]:
+    """Returns numbers from 0 to 1 likewise, each right to 0.00001.
 
-    >>> nearly(np.array([12.345, 0.01234])), nearly(np.array([0.01234, 0.0]))
-    ('[12.3,0]', '[0.0123,0]')
+    >>> packed_shares(np.array([0.0, 1.0, np.nan]))
+    {'shape': [3], 'type': 'share', 'bytes': 'AAD+////'}
     """
-    largest = float(np.nanmax(np.abs(values), initial=0.0))
-    decimals = digits - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
-    return exactly(np.round(values, decimals), single=False)
+    told = np.where(np.isnan(values), MOST + 1, np.round(np.nan_to_num(values) * MOST))
+    return _packed(told.astype(np.uint16), "share")
 
 
-def _digits(values: FloatArray) -> Iterable[str]:
-    for text in values.ravel().astype(str).tolist():
-        if text.endswith(".0"):
-            yield "0" if text in ("0.0", "-0.0") else text[:-2]
-        else:
-            yield text if text[-1].isdigit() else "null"
-
-
-def _nested(shape: tuple[int, ...], texts: Iterable[str]) -> str:
-    if len(shape) == 0:
-        return next(iter(texts))
-    source = iter(texts)
-    return "[" + ",".join(_nested(shape[1:], source) for _ in range(shape[0])) + "]"
+def _packed(values: np.ndarray[Any, Any], kind: str) -> dict[str, Any]:
+    little = values if sys.byteorder == "little" else values.byteswap()
+    data = b64encode(np.ascontiguousarray(little).tobytes()).decode()
+    return {"shape": list(values.shape), "type": kind, "bytes": data}

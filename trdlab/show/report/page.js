@@ -7,8 +7,22 @@
 
   // ---- numbers and words ---------------------------------------------------------------------
 
-  const real = D.single ? Math.fround : Number; // numbers of single precision have fewer digits
-  const row = (t, a) => D.components[t][a].map(real);
+  /** Returns what `packed` has written, as arrays in arrays; what is no number is null. */
+  function inArrays({ shape, type, bytes }) {
+    const raw = Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)).buffer;
+    const of = { single: Float32Array, double: Float64Array, share: Uint16Array }[type];
+    const values = new of(raw), share = type === "share";
+    let next = 0;
+    const read = () => {
+      const value = share ? values[next++] / 65534 : values[next++];
+      return Number.isNaN(value) || (share && value > 1) ? null : value;
+    };
+    const nested = ([length, ...rest]) => Array.from({ length }, () => (rest.length ? nested(rest) : read()));
+    return nested(shape);
+  }
+
+  for (const name of ["components", "probabilities", "chances"]) if (D[name]) D[name] = inArrays(D[name]);
+  const row = (t, a) => D.components[t][a];
   const isAllowed = (t, a) => D.probabilities[t][a] !== null || D.components[t][a][0] !== null;
   const sum = (values) => values.reduce((x, y) => x + y, 0);
   const whole = (n) => n.toLocaleString("en-US");

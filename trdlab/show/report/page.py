@@ -28,7 +28,7 @@ from trdlab.rollouts.reel import Reel
 from trdlab.show.data import axis_data
 from trdlab.show.document import document
 from trdlab.show.report.card import card
-from trdlab.show.report.numbers import exactly, is_single, nearly
+from trdlab.show.report.numbers import packed, packed_shares
 from trdlab.show.report.pictures import sheets
 from trdlab.show.report.recording import Take
 from trdlab.show.report.told import Told
@@ -136,8 +136,7 @@ def data(material: Material) -> str:
     """Returns what the script reads, as JSON of the schema `trdlab.report/1`."""
     explained, take, told = material.explained, material.take, material.told
     episode, report, axis = take.recorded.episode, explained.report, explained.time_axis
-    components = _of_all([m.decomposition.components for m in take.moments], take, explained)
-    single = is_single(components)
+    components = [moment.decomposition.components for moment in take.moments]
     chances = [_chances(moment) for moment in take.moments]
     known = all(of is not None for of in chances)
     shown = _shown(material)
@@ -150,7 +149,6 @@ def data(material: Material) -> str:
         "time_axis": axis_data(axis),
         "when": [when_of(axis, i) for i in range(axis.num_components)],
         "actions": list(explained.agent.action_names),
-        "single": single,
         "taken": episode.actions.tolist(),
         "rewards": episode.rewards.tolist(),
         "ends": np.flatnonzero(episode.ends).tolist(),
@@ -165,15 +163,11 @@ def data(material: Material) -> str:
         "texts": _once(take.texts),
         "gallery": _gallery(material.gallery, shown),
         "maps": material.maps,
+        "components": packed(_of_all(components, take, explained)),
+        "probabilities": packed(_probabilities(material)),
+        "chances": packed_shares(_of_all(chances, take, explained)) if known and chances else None,
     }
-    numbers = {
-        "components": exactly(components, single=single),
-        "probabilities": exactly(_probabilities(material), single=False),
-        "chances": nearly(_of_all(chances, take, explained)) if known and chances else "null",
-    }
-    told_json = json.dumps(plain_data(parts), separators=(",", ":"), allow_nan=False)
-    rest = ",".join(f'"{name}":{text}' for name, text in numbers.items())
-    return f"{told_json[:-1]},{rest}}}"
+    return json.dumps(plain_data(parts), separators=(",", ":"), allow_nan=False)
 
 
 def _chosen(material: Material) -> tuple[int, int | None] | None:

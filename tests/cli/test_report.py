@@ -20,7 +20,7 @@ def test_a_run_gets_a_page_of_its_own_each_time(trdlab, trained):
         held = json.loads(found[1])
         assert held["actions"] == ["up", "down", "left", "right"]
         assert len(held["pictures"]["at"]) == len(held["taken"]) + 1
-        assert held["single"]
+        assert held["components"]["type"] == "single"
 
 
 def test_a_file_is_replaced_only_if_that_is_asked_for(trdlab):

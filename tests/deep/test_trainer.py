@@ -202,6 +202,31 @@ def test_epsilon_is_the_share_of_random_actions():
     assert (taken == 0).mean() == pytest.approx(0.75, abs=0.05)
 
 
+def test_what_was_seen_before_the_first_update_standardises_all_networks():
+    trainer = scripted(STORY, STORY, steps=60, standardise=True, averaging=0.9)
+    networks = (trainer.learner.q_network, trainer.learner.target_network, trainer.learner.agent)
+    middles = {float(network.middle) for network in networks}
+    assert len(middles) == 1
+    assert 2.0 < middles.pop() < 10.0  # frames show their numbers: 0 to 13 by then
+    assert float(scripted(STORY, STORY, steps=60).learner.q_network.middle) == 0.0
+
+
+@pytest.mark.parametrize("standardise", [False, True])
+def test_frames_on_a_device_teach_the_same(monkeypatch, standardise):
+    """The CPU stands in for a card: what is drawn there are tensors."""
+
+    def learned() -> torch.Tensor:
+        trainer = scripted(STORY, STORY, steps=60, options={"stack": 2}, standardise=standardise)
+        return torch.cat([of.flatten() for of in trainer.learner.q_network.state_dict().values()])
+
+    from_arrays = learned()
+    monkeypatch.setattr(
+        "trdlab.deep.trainer.ReplayBuffer",
+        lambda *told, **how: ReplayBuffer(*told, **how | {"device": "cpu"}),
+    )
+    assert torch.equal(learned(), from_arrays)
+
+
 def test_nothing_is_held_beyond_the_end_of_an_episode():
     trainer = scripted(STORY, epsilon_hold=1000, learning_starts=10**6)
     for _ in range(12):

@@ -67,6 +67,18 @@ ActionNames = Annotated[
         show_default="as the environment does",
     ),
 ]
+TableGamma = Annotated[
+    float | None,
+    typer.Option("--gamma", help="Of an exact table: discount factor.", show_default="0.95"),
+]
+TableHorizon = Annotated[
+    int | None,
+    typer.Option("--N", help="Of an exact table: explicit components.", show_default="4"),
+]
+TableWidth = Annotated[
+    int | None,
+    typer.Option("--w", help="Of an exact table: steps in each.", show_default="1"),
+]
 MaxSteps = Annotated[int | None, max_steps_option("1000, or four horizons")]
 EpisodesSeed = Annotated[int, typer.Option("--seed", min=0, help="Of the episodes.")]
 Details = Annotated[bool, typer.Option("--details", help="Tell all there is to tell.")]
@@ -103,6 +115,28 @@ def pictures_option(drawn: str) -> Any:
     """Returns the option of a folder to draw into; `drawn` says when there is one by default."""
     default = f"{drawn} a new folder in explanations"
     return typer.Option("--out", metavar="DIR", help="Write pictures there.", show_default=default)
+
+
+def find(
+    agent: str,
+    env: str | None,
+    env_arguments: list[str] | None,
+    action_names: str | None,
+    **axis: Any,
+) -> "Agent":
+    """Returns the agent of a name, with its actions called as the option says.
+
+    Args:
+        agent: the name.
+        env: where it acts, if it is not its own environment.
+        env_arguments: what that is made with.
+        action_names: what to call its actions.
+        axis: γ, N and w of an exact table.
+    """
+    from trdlab.agents.naming import find_agent
+
+    found = find_agent(agent, env=env, env_arguments=env_arguments or (), **axis)
+    return named(found, action_names)
 
 
 def named(found: "Agent", action_names: str | None) -> "Agent":

@@ -58,18 +58,9 @@ def explain(
     env: common.Env = None,
     env_arguments: common.EnvArguments = None,
     action_names: common.ActionNames = None,
-    gamma: Annotated[
-        float | None,
-        typer.Option("--gamma", help="Of an exact table: discount factor.", show_default="0.95"),
-    ] = None,
-    horizon: Annotated[
-        int | None,
-        typer.Option("--N", help="Of an exact table: explicit components.", show_default="4"),
-    ] = None,
-    width: Annotated[
-        int | None,
-        typer.Option("--w", help="Of an exact table: steps in each.", show_default="1"),
-    ] = None,
+    gamma: common.TableGamma = None,
+    horizon: common.TableHorizon = None,
+    width: common.TableWidth = None,
     episodes: Annotated[
         int | None,
         typer.Option(
@@ -91,21 +82,13 @@ def explain(
     It plays an episode as the agent would, and explains one step of it.
     How far such forecasts can be trusted is judged by other episodes.
     """
-    from trdlab.agents.naming import find_agent
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.explanations.explanation import explain as explain_agent
     from trdlab.explanations.explanation import parse_parts
 
     parts = parse_parts(what)
-    found = find_agent(
-        agent,
-        gamma=gamma,
-        horizon=horizon,
-        width=width,
-        env=env,
-        env_arguments=env_arguments or (),
-    )
-    found = common.named(found, action_names)
+    axis = {"gamma": gamma, "horizon": horizon, "width": width}
+    found = common.find(agent, env, env_arguments, action_names, **axis)
     named = Path("explanations"), found.name
     is_named = out is None and not parts and not as_json
     if is_named:

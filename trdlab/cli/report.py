@@ -37,18 +37,9 @@ def report(
     env: common.Env = None,
     env_arguments: common.EnvArguments = None,
     action_names: common.ActionNames = None,
-    gamma: Annotated[
-        float | None,
-        typer.Option("--gamma", help="Of an exact table: discount factor.", show_default="0.95"),
-    ] = None,
-    horizon: Annotated[
-        int | None,
-        typer.Option("--N", help="Of an exact table: explicit components.", show_default="4"),
-    ] = None,
-    width: Annotated[
-        int | None,
-        typer.Option("--w", help="Of an exact table: steps in each.", show_default="1"),
-    ] = None,
+    gamma: common.TableGamma = None,
+    horizon: common.TableHorizon = None,
+    width: common.TableWidth = None,
     episodes: Annotated[
         int | None,
         typer.Option(
@@ -70,22 +61,14 @@ def report(
     It is a single file, which any browser shows without a network, to go through an episode step by
     step. How far the forecasts can be trusted is judged by other episodes.
     """
-    from trdlab.agents.naming import find_agent
     from trdlab.cli.progress import EpisodeProgress
     from trdlab.files import free_file
     from trdlab.show.report.report import check_report, report_agent
 
     if out is not None:
         check_report(out, overwrite=overwrite)
-    found = find_agent(
-        agent,
-        gamma=gamma,
-        horizon=horizon,
-        width=width,
-        env=env,
-        env_arguments=env_arguments or (),
-    )
-    found = common.named(found, action_names)
+    axis = {"gamma": gamma, "horizon": horizon, "width": width}
+    found = common.find(agent, env, env_arguments, action_names, **axis)
     path = free_file(Path("reports"), found.name, ".html") if out is None else out
     with EpisodeProgress(common.errors(), "Getting ready") as progress:
         report_agent(

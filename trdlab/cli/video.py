@@ -47,18 +47,9 @@ def video(
     env: common.Env = None,
     env_arguments: common.EnvArguments = None,
     action_names: common.ActionNames = None,
-    gamma: Annotated[
-        float | None,
-        typer.Option("--gamma", help="Of an exact table: discount factor.", show_default="0.95"),
-    ] = None,
-    horizon: Annotated[
-        int | None,
-        typer.Option("--N", help="Of an exact table: explicit components.", show_default="4"),
-    ] = None,
-    width: Annotated[
-        int | None,
-        typer.Option("--w", help="Of an exact table: steps in each.", show_default="1"),
-    ] = None,
+    gamma: common.TableGamma = None,
+    horizon: common.TableHorizon = None,
+    width: common.TableWidth = None,
     episodes: Annotated[
         int,
         typer.Option("--episodes", min=0, help="To judge it by; what fails is pale."),
@@ -76,21 +67,13 @@ def video(
 
     The key moments are told in words, and what was expected is held against what came.
     """
-    from trdlab.agents.naming import find_agent
     from trdlab.cli.progress import EpisodeProgress, VideoProgress
     from trdlab.explanations.explanation import explain
     from trdlab.show.video.films import check
 
     check(out, what.value, rate=rate, overwrite=overwrite)
-    found = find_agent(
-        agent,
-        gamma=gamma,
-        horizon=horizon,
-        width=width,
-        env=env,
-        env_arguments=env_arguments or (),
-    )
-    found = common.named(found, action_names)
+    axis = {"gamma": gamma, "horizon": horizon, "width": width}
+    found = common.find(agent, env, env_arguments, action_names, **axis)
     with EpisodeProgress(common.errors(), "Getting ready") as progress:
         explained = explain(
             found,

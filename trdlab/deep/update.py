@@ -175,6 +175,7 @@ class Learner:
 
     def standardise(self, seen: Any) -> None:
         """Makes observations like these `[M, ...]` easy to learn from; before anything is."""
+        seen = seen.cpu().numpy() if isinstance(seen, Tensor) else seen  # of a card's memory
         for network in (self.q_network, self.target_network, self.agent):
             network.standardise(seen)
 

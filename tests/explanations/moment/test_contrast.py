@@ -311,6 +311,33 @@ def test_a_difference_that_cannot_be_trusted_is_not_discussed():
     assert not of_kind(sure, "untested-difference")
 
 
+def test_differences_far_below_what_forecasts_are_off_by_are_not_discussed():
+    rows = [[0.0, 0.02, 0.0, 0.01], [0.0, 0.0, 0.005, 0.0]]  # a leads by 0, 0.02, 0.015, 0.025
+    off = calibrated(TimeAxis(GAMMA, 3), off_by=[0.0, 0.3, 0.4, 0.0])
+    of = moment(rows, calibration=off).choice("a", "b")
+    (close,) = of_kind(of, "hardly-apart")
+    assert close.most == pytest.approx(0.025)
+    assert close.error == pytest.approx(np.sqrt(2 * (0.3**2 + 0.4**2)))
+    assert close.sentence == (
+        "A and b hardly differ: by 0.025 at most, added up to any step, where such forecasts are "
+        "off by about 0.707."
+    )
+    assert [claim.kind for claim in in_brief(of)][:2] == ["hardly-apart", "better"]
+    assert not of_kind(of, "more-immediate")
+    assert not of_kind(of, "reasons")
+    known = calibrated(TimeAxis(GAMMA, 3), off_by=[0.0, 0.1, 0.1, 0.0])  # 0.02 > 0.1 √2 / 10
+    assert not of_kind(moment(rows, calibration=known).choice("a", "b"), "hardly-apart")
+    unknown = moment(rows, calibration=calibrated(TimeAxis(GAMMA, 3))).choice("a", "b")
+    assert of_kind(unknown, "more-immediate")
+
+
+def test_a_reward_far_below_what_forecasts_are_off_by_does_not_stand_out():
+    rows = [[0.01, 0.0, 0.02, 0.0]] * 2
+    off = calibrated(TimeAxis(GAMMA, 3), off_by=[0.2, 0.2, 0.1, 0.2])
+    (first,) = of_kind(moment(rows, calibration=off).choice("a", "b"), "first-expected")
+    assert first.component == 2  # without what they are off by it would be the first
+
+
 def test_a_learned_table_is_explained_like_an_exact_one():
     world = Gridworld(load_map("drone"))
     learned = learn(world.mdp, TimeAxis(GAMMA, 4), agent_steps=200_000, seed=0)

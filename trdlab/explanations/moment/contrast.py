@@ -13,10 +13,11 @@ from trdlab.explanations.moment.leads import (
     is_by_discount,
     is_immediate,
     leads_of,
+    off_together,
     sums,
 )
 from trdlab.explanations.moment.moment import CHOICES, Choice
-from trdlab.explanations.moment.steps import doubtful
+from trdlab.explanations.moment.steps import SLIGHT, doubtful
 from trdlab.explanations.rules import Claim, Fields, Found, every, first
 
 _DECIDES = 0.8  # of all that differs: what lies at one step decides
@@ -29,7 +30,8 @@ def contrast(choice: Choice) -> list[Claim]:
 
     Who is ahead comes first, and of a lead of the action that is worth less what makes up for it;
     then totals and values, and the few steps that are enough to prefer the better action. Where
-    more than half of the difference is not to be trusted, that is told in place of what comes when.
+    more than half of the difference is not to be trusted, or all of it is small beside what
+    forecasts are off by, that is told in place of what comes when.
     """
     if expected := every(choice, *nothing):
         return expected
@@ -38,6 +40,8 @@ def contrast(choice: Choice) -> list[Claim]:
         return same_all_along + worth
     if doubt := every(choice, *untested_difference):
         return worth[-1:] + doubt + worth[:-1]
+    if close := every(choice, hardly_apart):
+        return close + worth
     passing, decided = every(choice, *turns), every(choice, decided_at)
     rest = every(choice, never_behind, reasons)
     if decided and not passing:
@@ -174,6 +178,21 @@ def untested_difference(choice: Choice) -> Iterator[Found]:
                 yield "untested-whole", about
             else:
                 yield "untested-difference", about | {"share": share, "components": components}
+
+
+@CHOICES.rule(
+    "{action} and {foil} hardly differ: by {most:number} at most, added up to any step, where such "
+    "forecasts are off by about {error:number}."
+)
+def hardly_apart(choice: Choice) -> Iterator[Fields]:
+    """No lead of what was learned is more than `SLIGHT` of what forecasts of both are off by."""
+    for action, foil in choice.orders[:1]:
+        size = np.abs(choice.moment.lead(action, foil))
+        error = off_together(choice.moment, action, foil)
+        if size.any() and (size <= SLIGHT * error).all():
+            i = int(size.argmax())
+            about = {"action": action, "foil": foil}
+            yield about | {"most": float(size[i]), "error": float(error[i])}
 
 
 @CHOICES.rule(

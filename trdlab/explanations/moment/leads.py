@@ -7,7 +7,14 @@ import numpy as np
 
 from trdlab.arrays import FloatArray, same
 from trdlab.explanations.moment.moment import Choice, Moment
-from trdlab.explanations.moment.steps import NEGLIGIBLE, SHARE, least, stands_out
+from trdlab.explanations.moment.steps import (
+    NEGLIGIBLE,
+    SHARE,
+    SLIGHT,
+    least,
+    off_by,
+    stands_out,
+)
 from trdlab.explanations.rules import Fields
 
 NOISE = 0.1  # of the largest lead: up to this one of what was learned may be noise
@@ -58,7 +65,7 @@ def leads_of(choice: Choice) -> Iterator[Fields]:
     axis, soon = choice.time_axis, _soon(choice)
     for leader, other in choice.orders:
         lead, in_the_end = np.split(choice.moment.lead(leader, other), [-1])  # [N], [1]
-        lead[np.abs(lead) < _least_lead(choice.moment, leader, other)] = 0.0
+        lead[np.abs(lead) < _least_lead(choice.moment, leader, other)[:-1]] = 0.0
         places = np.flatnonzero(lead)
         if not places.size or lead[places[0]] < 0:
             continue
@@ -108,16 +115,25 @@ def _notable(choice: Choice, lead: Fields) -> FloatArray:
     return np.concatenate(rows)
 
 
-def _least_lead(moment: Moment, action: str, foil: str) -> float:
-    """Returns the least lead that is told.
+def off_together(moment: Moment, action: str, foil: str) -> FloatArray:
+    """Returns `[N+1]`: what a lead is off by, as forecasts of both usually are up to there."""
+    squares = off_by(moment, action) ** 2 + off_by(moment, foil) ** 2
+    return np.asarray(np.sqrt(squares.cumsum()))
 
-    What was learned may be noise up to `NOISE` of the largest explicit lead. Of an exact table
-    `NEGLIGIBLE` of the largest lead is left out, and what does not stand out at a step of either.
+
+def _least_lead(moment: Moment, action: str, foil: str) -> FloatArray:
+    """Returns `[N+1]`: the least lead that is told.
+
+    What was learned may be noise up to `NOISE` of the largest explicit lead, and up to `SLIGHT` of
+    what it is off by. Of an exact table `NEGLIGIBLE` of the largest lead is left out, and what does
+    not stand out at a step of either.
     """
     size = np.abs(moment.lead(action, foil))  # [N+1]
-    if moment.is_exact:
-        return max(NEGLIGIBLE * float(size.max()), least(moment, action), least(moment, foil))
-    return NOISE * float(size[:-1].max(initial=0.0))
+    if not moment.is_exact:
+        noise = NOISE * float(size[:-1].max(initial=0.0))
+        return np.maximum(noise, SLIGHT * off_together(moment, action, foil))
+    steps = [least(moment, name).max(initial=0.0) for name in (action, foil)]
+    return np.full(len(size), max(NEGLIGIBLE * float(size.max()), *steps))
 
 
 def crossings(choice: Choice) -> Iterator[tuple[str, str, int]]:
@@ -131,7 +147,7 @@ def crossings(choice: Choice) -> Iterator[tuple[str, str, int]]:
     moment, action, foil = choice.moment, choice.action, choice.foil
     lead, least_lead = moment.lead(action, foil), _least_lead(moment, action, foil)
     runs = [list(run) for _, run in groupby(np.flatnonzero(lead), key=lambda i: lead[i] > 0)]
-    clear = [run for run in runs if np.abs(lead[run]).max() >= least_lead]
+    clear = [run for run in runs if (np.abs(lead[run]) >= least_lead[run]).any()]
     if runs and runs[-1] not in clear and not same(moment.q_value(action), moment.q_value(foil)):
         clear.append(runs[-1])
     found = []

@@ -10,6 +10,7 @@ from trdlab.explanations.moment.steps import (
     SHARE,
     explicit_end,
     largest,
+    off_by,
     shares,
     stands_out,
     undiscounted,
@@ -161,10 +162,10 @@ def peaks(moment: Moment, action: str) -> list[int]:
 
 def _doubt(moment: Moment, action: str) -> FloatArray:
     """Returns `[K]`: what such forecasts are off by, in the unit of `shares`; 0 if not known."""
-    row, judged = undiscounted(moment, action), moment.judged(action)
-    if judged is None or moment.is_exact or not row.any():
-        return np.zeros(len(row))
-    error = np.nan_to_num(judged.off_by[: len(row)]) / moment.time_axis.discounts[: len(row)]
+    row = undiscounted(moment, action)
+    if not row.any():
+        return row
+    error = off_by(moment, action)[: len(row)] / moment.time_axis.discounts[: len(row)]
     return np.asarray(error / np.abs(row).max())
 
 

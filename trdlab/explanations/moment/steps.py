@@ -6,6 +6,7 @@ from trdlab.arrays import BoolArray, FloatArray
 from trdlab.explanations.moment.moment import Moment
 
 SHARE = 0.2  # of the largest that is expected at any one step: what stands out is at least that
+SLIGHT = 0.1  # of what forecasts are off by: so little is lost in what chance does
 NEGLIGIBLE = 0.01  # what an exact table expects below this share is not worth a sentence
 LEAST_DISCOUNT = float(np.finfo(np.float64).tiny) ** 0.25  # what is smaller cannot be taken out
 _ROUNDING = 9  # decimals, of a share of the largest
@@ -20,6 +21,14 @@ def doubtful(moment: Moment, action: str) -> BoolArray:
     if judged is None or moment.is_exact:
         return np.zeros(moment.time_axis.num_components, dtype=np.bool_)
     return judged.trust.doubtful
+
+
+def off_by(moment: Moment, action: str) -> FloatArray:
+    """Returns `[N+1]`: what forecasts of such an action are off by; 0 where it is not known."""
+    judged = moment.judged(action)
+    if judged is None or moment.is_exact:
+        return np.zeros(moment.time_axis.num_components)
+    return np.asarray(np.nan_to_num(judged.off_by))
 
 
 def explicit_end(moment: Moment, action: str) -> int:
@@ -47,21 +56,22 @@ def stands_out(moment: Moment, action: str) -> BoolArray:
     return np.asarray((size > 0.0) & (size >= least(moment, action)))
 
 
-def least(moment: Moment, action: str) -> float:
-    """Returns the least that stands out at a step, without its discount.
+def least(moment: Moment, action: str) -> FloatArray:
+    """Returns `[K]`: the least that stands out at each step, without its discount.
 
-    Of what was learned that is `SHARE` of the largest that is expected. Of an exact table, which
-    has no noise, it is `NEGLIGIBLE` of the largest, or of the reward that would be worth the
-    residual if every later step paid it.
+    Of what was learned that is `SHARE` of the largest that is expected, and `SLIGHT` of what such
+    forecasts are off by. Of an exact table, which has no noise, it is `NEGLIGIBLE` of the largest,
+    or of the reward that would be worth the residual if every later step paid it.
     """
-    axis = moment.time_axis
-    largest = float(np.abs(undiscounted(moment, action)).max(initial=0.0))
+    axis, row = moment.time_axis, np.abs(undiscounted(moment, action))
+    largest = float(row.max(initial=0.0))
     if not moment.is_exact:
-        return SHARE * largest
+        noise = off_by(moment, action)[: len(row)] / axis.discounts[: len(row)]
+        return np.maximum(SHARE * largest, SLIGHT * noise)
     later = abs(float(moment.components(action)[-1])) * (1.0 - axis.gamma**axis.width)
     begins = float(axis.discounts[-1])
     rate = later / begins if begins >= LEAST_DISCOUNT else 0.0
-    return NEGLIGIBLE * max(largest, rate)
+    return np.full(len(row), NEGLIGIBLE * max(largest, rate))
 
 
 def largest(moment: Moment, action: str) -> int:

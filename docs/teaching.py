@@ -14,10 +14,12 @@ from base64 import b64encode
 from collections.abc import Callable, Iterator, Sequence
 from html import escape
 from importlib.util import find_spec
+from mimetypes import guess_type
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import yaml
 from kept import Files, fingerprint, made
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
@@ -65,11 +67,11 @@ SHEET = {
 _EXERCISE = re.compile(r"^# \*\*Exercise (\S+)\.\*\* (.*(?:\n#(?! >).*)*)", re.MULTILINE)
 _RULER = re.compile(r"<hr\s*/?>")
 _LINK = re.compile(r'<a class="headerlink".*?</a>', re.DOTALL)
-_FIGURE = re.compile(r'src="[^"]*figures/([\w-]+\.svg)"')
+_SOURCE = re.compile(r'src="(?:\.\./)*([^":]+)"')
 _CREDIT = """\
-These figures are by the trdlab developers, and may be used under the Creative Commons
-Attribution 4.0 International licence (CC BY 4.0), whose text is in LICENSE.txt. Name the source, for
-example: "Figure: trdlab developers, CC BY 4.0", and say if you changed it.
+These figures are by the trdlab developers. They may be used under the Creative Commons Attribution
+4.0 International licence (CC BY 4.0), whose text is in LICENSE.txt. Name the source, for example:
+"Figure: trdlab developers, CC BY 4.0", and say if you changed it.
 
 Each was drawn by the command beside it:
 
@@ -127,10 +129,11 @@ def drawn(licence: bytes) -> Files:
         found = {f"{name}.svg": Path(folder, f"{name}.svg").read_bytes() for name in FIGURES}
     about = _CREDIT + "".join(f"{name}.svg: {command}\n" for name, (_, command) in FIGURES.items())
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as file:
+    with zipfile.ZipFile(packed, "w") as file:
         texts = {"LICENSE.txt": licence, "README.txt": about.encode()}
         for name, content in (texts | found).items():
-            file.writestr(zipfile.ZipInfo(f"trdlab-figures/{name}"), content)  # the same each time
+            entry = zipfile.ZipInfo(f"trdlab-figures/{name}")  # of no date: the same each time
+            file.writestr(entry, content, zipfile.ZIP_DEFLATED)
     pictures = {f"figures/{name}": content for name, content in found.items()}
     return pictures | {Path(ARCHIVE).name: packed.getvalue()}
 
@@ -153,14 +156,21 @@ def deck(title: str, content: str, pictures: Files) -> str:
     Args:
         title: of all.
         content: the HTML of the slides, with a ruler between two of them.
-        pictures: the figures that they show.
+        pictures: the figures that they show, beside files of the documentation.
+
+    Raises:
+        PluginError: they show a picture that is not there.
     """
 
     def inlined(found: re.Match[str]) -> str:
-        data = b64encode(pictures[f"figures/{found[1]}"]).decode()
-        return f'src="data:image/svg+xml;base64,{data}"'
+        path = found[1]
+        if path not in pictures and not (DOCS / path).is_file():
+            raise PluginError(f"A slide shows {path}, which is not there.")
+        data = pictures.get(path) or (DOCS / path).read_bytes()
+        kind = guess_type(path)[0]
+        return f'src="data:{kind};base64,{b64encode(data).decode()}"'
 
-    parts = _RULER.split(_FIGURE.sub(inlined, _LINK.sub("", content)))
+    parts = _RULER.split(_SOURCE.sub(inlined, _LINK.sub("", content)))
     slides = "\n".join(f"<section>{part.strip()}</section>" for part in parts if part.strip())
     template = (DOCS / "deck.html").read_text(encoding="utf-8")
     return template.replace("{{ title }}", escape(title)).replace("{{ slides }}", slides)
@@ -199,6 +209,39 @@ def questions(tutorials: Path = DOCS.parent / "tutorials") -> Iterator[tuple[str
         for found in _EXERCISE.finditer(script.read_text(encoding="utf-8")):
             lines = [line.removeprefix("#").removeprefix(" ") for line in found[2].splitlines()]
             yield found[1], "\n".join(lines).rstrip().replace("](", "](../lessons/")
+
+
+def bibliography() -> str:
+    """Returns BibTeX of the paper and of trdlab, from `CITATION.cff`."""
+    own = yaml.safe_load((DOCS.parent / "CITATION.cff").read_text(encoding="utf-8"))
+    paper = own["preferred-citation"]
+    fields = {
+        "inproceedings{towers2024explaining": {
+            "title": paper["title"],
+            "author": _authors(paper),
+            "booktitle": paper["collection-title"],
+            "year": paper["year"],
+            "url": paper["url"],
+        },
+        "software{trdlab": {
+            "title": own["title"],
+            "author": f"{{{_authors(own)}}}",
+            "version": own["version"],
+            "license": own["license"],
+        },
+    }
+    entries = [
+        f"@{kind},\n" + "".join(f"  {name} = {{{value}}},\n" for name, value in of.items()) + "}"
+        for kind, of in fields.items()
+    ]
+    return "\n\n".join(["```bibtex", *entries, "```"]).replace("```bibtex\n\n", "```bibtex\n")
+
+
+def _authors(work: dict[str, Any]) -> str:
+    people = work["authors"]
+    return " and ".join(
+        one.get("name") or f"{one['family-names']}, {one['given-names']}" for one in people
+    )
 
 
 def _number(answer: Any) -> str:

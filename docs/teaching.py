@@ -13,7 +13,6 @@ import zipfile
 from base64 import b64encode
 from collections.abc import Callable, Iterator, Sequence
 from html import escape
-from importlib.util import find_spec
 from mimetypes import guess_type
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,6 +24,8 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure import files as structure
 from mkdocs.structure.pages import Page
+
+import trdlab
 
 DOCS = Path(__file__).parent
 DECK, SLIDES, ARCHIVE = "teach/deck.html", "teach/slides.md", "teach/figures.zip"
@@ -104,11 +105,10 @@ def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
 
 def figures(cache: Path) -> Files:
     """Returns the figures and the archive of all, by their names, drawn if they have to be."""
-    [package] = getattr(find_spec("trdlab"), "submodule_search_locations", None) or [""]
-    licence = DOCS / "teach" / "CC-BY-4.0.txt"
+    licence, package = DOCS / "teach" / "CC-BY-4.0.txt", Path(trdlab.__file__).parent
 
     def hashed() -> str:
-        return fingerprint(DOCS / "teaching.py", licence, Path(package))
+        return fingerprint(DOCS / "teaching.py", licence, package)
 
     return made(cache, "figures", hashed, lambda: drawn(licence.read_bytes()))
 

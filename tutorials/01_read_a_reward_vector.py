@@ -27,8 +27,7 @@ from trdlab.gridworld.render import draw_map
 from trdlab.show.plots.moment import plot_components
 from trdlab.show.plots.style import action_colours
 from trdlab.tabular import exact, undiscounted_totals
-
-from exercise import check
+from trdlab.teach import check
 
 world = Gridworld(load_map("drone"))
 print("\n".join(world.grid.rows))

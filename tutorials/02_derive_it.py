@@ -15,8 +15,7 @@ from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.gridworld import Gridworld, load_map, map_names
 from trdlab.tabular import exact, undiscounted_totals
-
-from exercise import check
+from trdlab.teach import check
 
 GAMMA = 0.95
 world = Gridworld(load_map("drone"))

@@ -17,8 +17,7 @@ from trdlab.bellman import target
 from trdlab.decomposition import TimeAxis
 from trdlab.gridworld import Gridworld, load_map
 from trdlab.tabular import exact, learn, spread
-
-from exercise import check
+from trdlab.teach import check
 
 AXIS = TimeAxis(gamma=0.95, horizon=4, width=1)
 UP, DOWN, LEFT, RIGHT = range(4)

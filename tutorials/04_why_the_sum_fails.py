@@ -18,8 +18,7 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.show.plots.moment import plot_components
 from trdlab.show.plots.style import action_colours
 from trdlab.tabular import WindowBuilder, exact, learn, operator_table
-
-from exercise import check
+from trdlab.teach import check
 
 GAMMA = 0.95
 UP, DOWN, LEFT, RIGHT = range(4)

@@ -22,10 +22,9 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.gridworld.pixels import pictures
 from trdlab.rollouts.evaluation import evaluate
 from trdlab.tabular import exact
+from trdlab.teach import check
 from trdlab.training.machine import resolved
 from trdlab.training.setup import future, new_trainer
-
-from exercise import check
 
 UP, DOWN, LEFT, RIGHT = range(4)
 

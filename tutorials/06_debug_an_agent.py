@@ -31,8 +31,7 @@ from trdlab.show.plots.calibration import plot_trust, trust_handles
 from trdlab.show.plots.style import add_legend
 from trdlab.tabular import exact
 from trdlab.tabular.episodes import ModelEnvironments
-
-from exercise import check
+from trdlab.teach import check
 
 # %% [markdown]
 # ## 1. One autopilot

@@ -22,8 +22,7 @@ import torch
 
 import trdlab
 from trdlab.policies import EpsilonGreedy, Likeliest
-
-from exercise import check
+from trdlab.teach import check
 
 try:
     from stable_baselines3 import PPO

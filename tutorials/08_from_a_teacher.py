@@ -16,8 +16,7 @@ from tempfile import mkdtemp
 import torch
 
 import trdlab
-
-from exercise import check
+from trdlab.teach import check
 
 torch.set_num_threads(1)  # such small networks are no faster with more
 folder = Path(mkdtemp())  # what is kept of this lesson

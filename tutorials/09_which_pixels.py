@@ -16,8 +16,7 @@ import numpy as np
 import torch
 
 import trdlab
-
-from exercise import check
+from trdlab.teach import check
 
 torch.set_num_threads(1)  # such small networks are no faster with more
 

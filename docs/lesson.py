@@ -36,13 +36,14 @@ _ENVIRONMENT = {
 _SETUP = """\
 %matplotlib inline
 %config InlineBackend.figure_formats = ["svg"]
-%config InlineBackend.print_figure_kwargs = dict(bbox_inches=None, metadata=dict(Date=None, Creator=None))
+undated = {"Date": None, "Creator": None}
+%config InlineBackend.print_figure_kwargs = {"bbox_inches": None, "metadata": undated}
 import matplotlib, warnings
 matplotlib.style.use("default")  # whatever the user's settings say
 matplotlib.rcParams["svg.hashsalt"] = "trdlab"  # the same bytes each time
 warnings.simplefilter("error")
 warnings.filterwarnings("ignore", module="ipykernel")  # which warns while it ends
-del matplotlib, warnings"""
+del matplotlib, undated, warnings"""
 _QUIET = ["--Application.log_level=ERROR"]  # of the kernel
 _BOX = re.compile(r"^> \*\*(The formula|An open question)[^*]*\*\*((?:.*\n> ?)*.*)", re.MULTILINE)
 _KINDS = {"The formula": "abstract", "An open question": "question"}

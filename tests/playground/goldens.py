@@ -8,7 +8,6 @@ import json
 import math
 import sys
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from trdlab.explanations.moment.sensitivity import find_flips, flips
 from trdlab.explanations.rules import every, first
 from trdlab.explanations.sections import at_first
 from trdlab.gridworld import Gridworld, map_names, parse_map
+from trdlab.gridworld.gridmap import map_text
 from trdlab.tabular import MDP, exact
 
 FILE = Path(__file__).with_name("goldens.json")
@@ -43,8 +43,7 @@ Settings = dict[str, Any]
 
 def cases() -> list[dict[str, Any]]:
     """Returns what the solver says of all maps that are shipped, and of random ones."""
-    texts = {name: import_module("trdlab.playground").maps()[name] for name in map_names()}
-    known = [case(texts[name], settings) for name in map_names() for settings in SHIPPED]
+    known = [case(map_text(name), settings) for name in map_names() for settings in SHIPPED]
     rng = np.random.default_rng(14)
     while len(known) < len(map_names()) * len(SHIPPED) + RANDOM:
         text, settings = random_map(rng), random_settings(rng)

@@ -6,7 +6,7 @@ const SETTLED = 1e-15; // of its parts: a value that changes by less is solved
 const FADED = 1e-22; // of the largest reward: a value that changes by less is solved, too
 const TIE = 1e-11; // of their parts: actions that differ by less are equally good
 const RELATIVE_ZERO = 1e-12; // two numbers closer than this, relative to the larger, are the same
-const SAME_TOTAL = 1e-9; // sums of many steps that differ by less are the same
+export const SAME_TOTAL = 1e-9; // sums of many steps that differ by less are the same
 const MOST_PASSES = 200000;
 
 export const isSame = (a, b, share = RELATIVE_ZERO) => Math.abs(a - b) <= share * Math.max(Math.abs(a), Math.abs(b));

@@ -3,14 +3,13 @@
 
 import { counted, digitsToTell, firstSteps, gains, gives, joined, number, percent, plain, said, sentence, size, whenOf } from "./numbers.js";
 import { ACTIONS } from "./world.js";
-import { difference, following, isSame, stays, sum, vector } from "./solver.js";
+import { SAME_TOTAL, difference, following, isSame, stays, sum, vector } from "./solver.js";
 
 const NEGLIGIBLE = 0.01; // what is expected below this share is not worth a sentence
 const SHARE = 0.2; // of a lead: what makes up so much of it is told as it stands soon
 const SEEN = 1e-3; // of a sum: a cost that changes it as it is printed
 const DECIDES = 0.8; // of all that differs: what lies at one step decides
 const LEAST_DISCOUNT = 2.2250738585072014e-308 ** 0.25; // what is smaller cannot be taken out
-const SAME_TOTAL = 1e-9;
 
 /** Returns what is known of one state: an entry for each action, and what ties there. */
 export function momentOf(solved, state) {

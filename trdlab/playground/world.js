@@ -27,6 +27,7 @@ export const paysOnce = ({ kind }) => kind === "coin" || kind === "treasure";
 export class MapFault extends Error {
   constructor(cause, cure) {
     super(`${cause} ${cure}`);
+    this.cure = cure;
   }
 }
 

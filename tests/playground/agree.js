@@ -1,9 +1,8 @@
 // Says where the playground's solver differs from the golden answers; run in a browser by the tests.
 import * as words from "/words.js";
 import { buildWorld, changed, findState, parseMap } from "/world.js";
-import { ambiguous, decompose, emptyTable, solve, sweep, totals, vector } from "/solver.js";
+import { solved } from "/solver.js";
 import { flipsOfGamma } from "/flips.js";
-import { plain } from "/numbers.js";
 
 const NEAR = 1e-9, NAMES = ["up", "down", "left", "right"];
 
@@ -17,17 +16,15 @@ function faultsOf({ text, gamma, N, w, slip = null, treasure = null, num_states,
   const check = (is, what) => { if (!is) found.push(what); };
   const world = buildWorld(changed(parseMap(text), { slip, treasure }));
   check(world.states.length === num_states, `${world.states.length} states, not ${num_states}`);
-  const solution = solve(world, gamma), components = decompose(world, solution, N, w), whole = totals(world, solution);
-  const solved = { world, solution, components, totals: whole, ambiguous: ambiguous(world, solution, whole, N * w), axis: { gamma, horizon: N, width: w } };
-  let table = emptyTable(world, N);
-  if (swept) for (let k = 0; k < 5; k++) table = sweep(world, gamma, w, table);
+  const answer = solved(world, { gamma, N, w, sweeps: swept ? 5 : null });
   states.forEach((want, k) => {
-    const s = want.state, moment = words.momentOf(solved, s);
+    const s = want.state, moment = words.momentOf(answer, s);
     check(findState(world, want.place) <= s, `no state at ${want.place}`);
     for (let a = 0; a < 4; a++) {
       check(isNear(moment.vectors[a], want.components[a]), `state ${s} ${NAMES[a]}: ${moment.vectors[a]}, not ${want.components[a]}`);
-      check(isNear([whole[4 * s + a]], [want.totals[a]]), `state ${s} ${NAMES[a]}: total ${whole[4 * s + a]}, not ${want.totals[a]}`);
-      if (swept) check(isNear(table.map((of) => of[4 * s + a]), swept[k][a]), `state ${s} ${NAMES[a]}: swept ${vector(table.map((mean) => ({ mean })), s, a)}, not ${swept[k][a]}`);
+      check(isNear([answer.totals[4 * s + a]], [want.totals[a]]), `state ${s} ${NAMES[a]}: total ${answer.totals[4 * s + a]}, not ${want.totals[a]}`);
+      const sofar = answer.table?.map((of) => of[4 * s + a]);
+      check(!swept || isNear(sofar, swept[k][a]), `state ${s} ${NAMES[a]}: swept ${sofar}, not ${swept?.[k][a]}`);
     }
     const choice = words.choose(moment), names = [NAMES[choice.action], NAMES[choice.foil] ?? null];
     check(names.join() === want.pair.join(), `state ${s}: the choice is ${names}, not ${want.pair}`);

@@ -13,7 +13,7 @@ from pathlib import Path
 from trdlab.gridworld import icons, map_names
 from trdlab.gridworld.gridmap import MAX_WIND, map_text
 
-MODULES = ("world", "solver", "flips", "numbers", "words", "pictures", "playground")
+MODULES = ("world", "solver", "flips", "numbers", "words", "address", "pictures", "playground")
 """In the order of their imports."""
 
 _HERE = Path(__file__).parent
@@ -66,7 +66,8 @@ def page() -> str:
 def _drawn(shape: icons.Shape) -> tuple[str, str]:
     """Returns the outline of a shape as the path of an SVG, and its colour; y grows downwards."""
     corners = (f"{x:.3f} {-y:.3f}" for x, y in shape.outline.tolist())
-    return f"M{'L'.join(corners)}Z", shape.colour
+    colour = "var(--floor)" if shape.colour == icons.FLOOR else shape.colour  # dark pages dim it
+    return f"M{'L'.join(corners)}Z", colour
 
 
 def _read(name: str) -> str:

@@ -16,6 +16,9 @@ export function flipsOfGamma(world, gamma, state, action, foil) {
   return findFlips(gap, Math.min(0.01, gamma), Math.max(0.99, gamma));
 }
 
+/** Returns the nearest γ with three decimals on the other side of a flip. */
+export const beyond = (flip, gamma) => (flip < gamma ? Math.floor(1000 * flip) : Math.ceil(1000 * flip)) / 1000;
+
 /**
  * Returns where a continuous gap changes its sign, in order.
  *

@@ -32,7 +32,7 @@ export function symbols(icons) {
   const parts = Object.entries(icons).map(([name, shapes]) => (
     svg("symbol", { id: `i-${name}`, viewBox: "-.5 -.5 1 1" }, ...shapes.map(([d, fill]) => svg("path", { d, fill })))
   ));
-  return svg("svg", { width: 0, height: 0, "aria-hidden": "true" }, ...parts);
+  return svg("svg", { class: "symbols", "aria-hidden": "true" }, ...parts);
 }
 
 const use = (name, more = {}) => svg("use", { href: `#i-${name}`, x: -0.5, y: -0.5, width: 1, height: 1, ...more });
@@ -66,6 +66,16 @@ export function cellName(cell) {
   return `${cell.kind} of ${plain(cell.value)}${cell.terminal ? ", ends the episode" : ""}`;
 }
 
+/** Returns the tools that a click on the map can use: to choose a state, or to draw a letter. */
+export function toolButtons(legend, chosen) {
+  const button = (letter, label, name, picture) => el("label", { className: "tool", title: name }, el("input", { type: "radio", name: "tool", value: letter, checked: letter === chosen, "aria-label": name }), picture, label);
+  const letters = [...legend].map(([letter, cell]) => {
+    const isStart = letter === "S", label = isStart ? "start" : cellName(cell).replace("floor", "empty");
+    return button(letter, label.replace("the episode", "").replace(" of ", " "), `${label}, letter ${letter}`, cellPicture(cell, { isStart }));
+  });
+  return [button("drone", "choose", "choose the state that is explained", cellPicture(legend.get("."), { hasDrone: true })), ...letters];
+}
+
 /**
  * Fills the grid of a map.
  *
@@ -83,32 +93,36 @@ export function drawMap(box, { grid, drone, stateAt, values, policy, news, over 
       el("div", { role: "gridcell", className: "cell", tabIndex: row + column ? -1 : 0, "data-row": row, "data-column": column })
     )))));
   }
-  for (const box_ of box.querySelectorAll(".cell")) {
-    const row = Number(box_.dataset.row), column = Number(box_.dataset.column), place = row * width + column;
+  for (const shown of box.querySelectorAll(".cell")) {
+    const row = Number(shown.dataset.row), column = Number(shown.dataset.column), place = row * width + column;
     const cell = legend.get(rows[row][column]), s = stateAt.get(place), isHere = drone?.row === row && drone?.column === column;
     const isTaken = !!drone && paysOnce(cell) && drone.collected.includes(place), isStart = rows[row][column] === "S";
     const strength = wind ? wind.strengths[wind.direction < 2 ? column : row] : 0;
-    box_.replaceChildren(cellPicture(cell, { isStart, isTaken, hasDrone: isHere, wind: wind && { ...wind, strength } }));
+    const look = { isStart, isTaken, hasDrone: isHere, wind: wind && { direction: wind.direction, strength } }, key = JSON.stringify([cell, look]);
+    if (shown.dataset.key !== key) shown.replaceChildren(cellPicture(cell, look), el("span", { className: "worth" }));
+    shown.dataset.key = key;
+    const isWorth = s !== undefined && !over[s], worth = shown.lastChild;
+    worth.hidden = !isWorth;
     let told = `row ${row}, column ${column}: ${isStart ? "start, " : ""}${cellName(cell)}${isTaken ? ", taken" : ""}`;
-    if (s !== undefined && !over[s]) {
-      box_.append(el("span", { className: "worth" }, ARROWS[policy[s]], el("span", {}, ` ${said(values[s], 2)}`)));
+    if (isWorth) {
+      worth.replaceChildren(ARROWS[policy[s]], el("span", {}, ` ${said(values[s], 2)}`));
       told += `; worth ${said(values[s], 3)}, best is ${ACTIONS[policy[s]]}`;
     }
-    box_.classList.toggle("here", isHere);
-    box_.classList.toggle("news", s !== undefined && news.has(s));
-    box_.setAttribute("aria-selected", String(isHere));
-    box_.setAttribute("aria-label", told + (isHere ? "; the drone is here" : ""));
+    shown.classList.toggle("here", isHere);
+    shown.classList.toggle("news", s !== undefined && news.has(s));
+    shown.setAttribute("aria-selected", String(isHere));
+    shown.setAttribute("aria-label", told + (isHere ? "; the drone is here" : ""));
   }
 }
 
 // ---- bars ----------------------------------------------------------------------------------------
 
 /** How strongly a component is painted: what comes soon is darkest, the residual is hatched. */
-const strength = (i, horizon) => (i === horizon ? 0.45 : 1 - (0.68 * i) / Math.max(1, horizon - 1));
+const shade = (i, horizon) => (i === horizon ? 0.45 : 1 - (0.68 * i) / Math.max(1, horizon - 1));
 
 function segment(i, horizon, { x, y, width, height, kind, fresh, title }) {
   const place = { x, y, width: Math.max(0, width), height };
-  const parts = [svg("rect", { ...place, class: kind, "fill-opacity": strength(i, horizon) }, svg("title", {}, title))];
+  const parts = [svg("rect", { ...place, class: kind, "fill-opacity": shade(i, horizon) }, svg("title", {}, title))];
   if (i === horizon) parts.push(svg("rect", { ...place, fill: "url(#hatch)", "pointer-events": "none" }));
   parts.push(svg("rect", { ...place, class: fresh ? "fresh" : "edge", "pointer-events": "none" }));
   return parts;
@@ -167,7 +181,7 @@ export function drawContrast(box, { row, axis, names }) {
     if (value) canvas.append(...segment(i, horizon, { x: at, y: from, width: thick, height: to - from, kind: value > 0 ? "a-one" : "a-other", title: `${label}: ${said(value, 4)}` }));
     if (each > 34) canvas.append(svg("text", { class: "strong", x: middle, y: value < 0 ? to + 13 : from - 4, "text-anchor": "middle" }, said(value, each > 48 ? 3 : 2)));
     const isShown = i === horizon || (i % every === 0 && x(horizon) - x(i) > 44);
-    if (isShown) canvas.append(svg("text", { x: middle, y: 162, "text-anchor": "middle" }, each > 62 || axis.width === 1 ? label : label.split("…")[0]));
+    if (isShown) canvas.append(svg("text", { x: Math.min(middle, width - 4 * label.length), y: 162, "text-anchor": "middle" }, each > 62 || axis.width === 1 ? label : label.split("…")[0]));
   });
   box.replaceChildren(canvas);
 }

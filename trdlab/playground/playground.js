@@ -2,22 +2,21 @@
 // MAPS, ICONS, LAYOUT and STYLE are put in front by trdlab/playground/__init__.py.
 
 import { ACTIONS, buildWorld, changed, findState, mapText, parseMap, treasureOf } from "./world.js";
-import { ambiguous, decompose, emptyTable, isSame, solve, sum, sweep, totals } from "./solver.js";
-import { choose, delta, flipSentences, headline, momentOf } from "./words.js";
-import { cellName, cellPicture, drawBars, drawContrast, drawLegend, drawMap, drawTable, el, symbols } from "./pictures.js";
-import { flipsOfGamma } from "./flips.js";
-import { counted, plain, said, sentence, number } from "./numbers.js";
+import { isSame, solved, sum } from "./solver.js";
+import { choose, delta, flipSentences, headline, momentOf, neverFlips, sweepWords } from "./words.js";
+import { drawBars, drawContrast, drawLegend, drawMap, drawTable, el, symbols, toolButtons } from "./pictures.js";
+import { DEFAULTS, LIMITS, OWN_MAP, commandOf, fromHash, toHash } from "./address.js";
+import { beyond, flipsOfGamma } from "./flips.js";
+import { counted, plain } from "./numbers.js";
 
-const DEFAULTS = { map: "drone", text: null, gamma: 0.95, N: 4, w: 1, slip: null, treasure: null, state: null, action: null, foil: null, sweeps: null };
-const FIELDS = { // label, explanation, least, most of the slider, step, most that can be typed
-  gamma: ["γ", "discount", 0, 0.999, 0.001, 0.999],
-  N: ["N", "components", 0, 12, 1, 40],
-  w: ["w", "steps in each", 1, 6, 1, 40],
-  slip: ["slip", "goes sideways", 0, 1, 0.01, 1],
-  treasure: ["treasure", "pays", 0, 20, 0.1, 1e6],
+const FIELDS = { // label, explanation, least and most of the slider, its step
+  gamma: ["γ", "discount", 0, 0.999, 0.001],
+  N: ["N", "components", 0, 12, 1],
+  w: ["w", "steps in each", 1, 6, 1],
+  slip: ["slip", "goes sideways", 0, 1, 0.01],
+  treasure: ["treasure", "pays", 0, 20, 0.1],
 };
-const OWN_MAP = "my-map.txt";
-const MOST_SWEEPS = 1000, MOST_FLIP_STATES = 600, PAUSE = 200; // ms without a change, before what takes longer
+const MOST_FLIP_STATES = 600, PAUSE = 200; // ms without a change, before what takes longer
 
 class Playground extends HTMLElement {
   connectedCallback() {
@@ -27,12 +26,11 @@ class Playground extends HTMLElement {
     root.adoptedStyleSheets = [style];
     root.append(symbols(ICONS), el("div", { id: "all", innerHTML: LAYOUT }));
     this.at = (id) => root.getElementById(id);
-    this.now = { ...DEFAULTS };
     this.past = [];
     this.tool = "drone";
     this.fill();
     this.listen();
-    this.readHash();
+    this.now = fromHash(location.hash, MAPS) ?? { ...DEFAULTS };
     this.update();
     new ResizeObserver(() => this.draw()).observe(this);
   }
@@ -47,25 +45,17 @@ class Playground extends HTMLElement {
       const drawn = parseMap(text);
       this.drawn = drawn;
       this.grid = changed(drawn, { slip: now.slip, treasure: treasureOf(drawn) === null ? null : now.treasure });
-      this.solved = this.solve(buildWorld(this.grid));
+      this.solved = solved(buildWorld(this.grid), now);
       this.fault("");
     } catch (error) {
       if (!("cure" in error)) throw error;
+      if (!this.solved) Object.assign(this.now, { text: null }); // there is nothing else to show
+      if (!this.solved) this.update();
       this.fault(error.message);
     }
     this.draw();
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.later(), PAUSE);
-  }
-
-  solve(world) {
-    const { gamma, N, w, sweeps } = this.now, axis = { gamma, horizon: N, width: w };
-    const solution = solve(world, gamma), components = decompose(world, solution, N, w), whole = totals(world, solution);
-    const solved = { world, solution, components, totals: whole, ambiguous: ambiguous(world, solution, whole, N * w), axis };
-    if (sweeps === null) return solved;
-    let table = emptyTable(world, N), before = table;
-    for (let k = 0; k < sweeps; k++) [before, table] = [table, sweep(world, gamma, w, table)];
-    return { ...solved, table, before };
   }
 
   /** Does what takes longer, once nothing changes for a moment: the flips, and the address. */
@@ -152,25 +142,14 @@ class Playground extends HTMLElement {
 
   /** Says what follows: the sentences of the solution, or how far the sweeps have come. */
   tell() {
-    const { moment, choice, now } = this, [first, ...more] = now.sweeps === null ? headline(moment, choice) : this.sweepWords();
+    const { moment, choice, now, solved } = this, [first, ...more] = solved.table ? sweepWords(moment, choice, solved, now.sweeps) : headline(moment, choice);
     if (this.at("says").textContent !== first) this.at("says").textContent = first;
     this.at("more").replaceChildren(...more.map((text) => el("li", {}, text)));
-    this.at("status").textContent = now.sweeps === null ? `Solved exactly: ${counted(this.solved.world.states.length, "state")}.` : `After ${counted(now.sweeps, "sweep")} from nothing.`;
+    const framed = now.sweeps ? " Framed in yellow: what the last one changed." : "";
+    this.at("status").textContent = now.sweeps === null ? `Solved exactly: ${counted(solved.world.states.length, "state")}.` : `After ${counted(now.sweeps, "sweep")} from nothing.${framed}`;
     this.at("forget").disabled = now.sweeps === 0;
     this.at("solve").disabled = now.sweeps === null;
-    this.at("sweep").disabled = now.sweeps >= MOST_SWEEPS;
-  }
-
-  sweepWords() {
-    const { solved: { table, components, world }, moment, choice: { action, foil }, now } = this;
-    if (moment.isOver) return headline(moment, this.choice);
-    const q = this.vectors().map(sum), pair = [action, foil].filter((a) => a >= 0);
-    const so_far = pair.map((a) => `${ACTIONS[a]} ${said(q[a])}`).join(" and "), exact = pair.map((a) => `${ACTIONS[a]} ${said(moment.q[a])}`).join(" and ");
-    const apart = Math.max(...table.flatMap((of, i) => [...of].map((value, row) => Math.abs(value - components[i].mean[row]))));
-    const largest = Math.max(...world.reward.map(Math.abs));
-    const begin = now.sweeps ? `After ${counted(now.sweeps, "sweep")} the values are: ${so_far}.` : "Before the first sweep nothing is expected anywhere.";
-    const rest = apart <= 1e-9 * largest ? "The sweeps have found the solution." : sentence`Solved, they are: ${exact}. Over the whole map, the component that is furthest off is off by ${number(apart)}.`;
-    return [begin, rest, "Each sweep looks as far ahead as one component is wide, and moves all that was known one component on."];
+    this.at("sweep").disabled = now.sweeps >= LIMITS.sweeps[1];
   }
 
   /** Returns `[4][N+1]`: what is shown of each action, as solved or as swept. */
@@ -188,24 +167,24 @@ class Playground extends HTMLElement {
     at("contrast-figure").hidden = !hasFoil;
     if (hasFoil) {
       const names = [choice.action, choice.foil].map((a) => ACTIONS[a]);
-      at("contrast-title").textContent = `${names[0]} minus ${names[1]}: up speaks for ${names[0]}, down for ${names[1]}`;
+      at("contrast-title").textContent = `${names.join(" minus ")}: above the line is what speaks for ${names[0]}, below it what speaks for ${names[1]}`;
       drawContrast(at("contrast"), { row: contrast, axis, names });
     }
-    const caption = `Discounted reward that is expected after each action at row ${row}, column ${column}${before ? ", as far as the sweeps have come" : ""}`;
+    const caption = `Expected discounted reward at row ${row}, column ${column}${before ? ", as swept so far" : ""}`;
     drawTable(at("table"), { vectors, contrast, totals: before ? null : moment.totals, choice, axis, caption });
   }
 
+  /** Shows where the choice flips: none where that was not looked for, `[]` where it never does. */
   showFlips(roots, instead = "") {
     const { at, now: { gamma }, moment, choice } = this, flips = roots ?? [];
-    const nearest = flips.length ? flips.reduce((a, b) => (Math.abs(b - gamma) < Math.abs(a - gamma) ? b : a)) : null;
-    const never = roots ? [`At no γ from ${plain(Math.min(0.01, gamma))} to ${plain(Math.max(0.99, gamma))} that was tried does the choice between the two flip.`] : [instead];
-    at("flip-words").replaceChildren(...(nearest === null ? never : ["The choice flips at γ = ", el("b", { id: "flip-at" }, flips.map((root) => root.toPrecision(5)).join(", ")), `. ${flipSentences(moment, choice, flips).join(" ")}`]));
-    at("flip-try").hidden = nearest === null;
-    this.nearest = nearest;
-    const most = FIELDS.gamma[3];
+    const told = flipSentences(moment, choice, flips).join(" ") || (roots ? neverFlips(moment, choice) : instead);
+    const where = flips.length ? ["The choice flips at γ = ", el("b", { id: "flip-at" }, flips.map((root) => root.toPrecision(5)).join(", ")), ". "] : [];
+    at("flip-words").replaceChildren(...where, told);
+    at("flip-try").hidden = !flips.length;
+    this.nearest = flips.toSorted((a, b) => Math.abs(a - gamma) - Math.abs(b - gamma))[0];
     at("gamma-track").replaceChildren(at("gamma-range"), ...flips.map((root) => {
       const mark = el("i", { title: `flips at ${root.toPrecision(5)}` });
-      mark.style.left = `calc(8px + (100% - 16px) * ${root / most})`;
+      mark.style.left = `calc(8px + (100% - 16px) * ${root / LIMITS.gamma[1]})`;
       return mark;
     }));
   }
@@ -227,9 +206,9 @@ class Playground extends HTMLElement {
     at("map").append(...options([...Object.keys(MAPS).map((name) => [name, name]), ["", "your own"]]));
     at("map").lastChild.hidden = true;
     for (const id of ["action", "foil"]) at(id).append(...options([["", ""], ...ACTIONS.map((name, a) => [a, name])]));
-    at("fields").append(...Object.entries(FIELDS).map(([name, [label, about, least, most, step, limit]]) => {
+    at("fields").append(...Object.entries(FIELDS).map(([name, [label, about, least, most, step]]) => {
       const range = el("input", { type: "range", id: `${name}-range`, min: least, max: most, step, "aria-label": `${label}, slider` });
-      const field = el("input", { type: "number", id: name, min: name === "treasure" ? -limit : least, max: limit, step: name === "treasure" ? "any" : step, "aria-describedby": `${name}-about` });
+      const field = el("input", { type: "number", id: name, min: LIMITS[name][0], max: LIMITS[name][1], step, "aria-describedby": `${name}-about` });
       return el("div", { className: "field" }, el("label", { htmlFor: name }, label, el("small", { id: `${name}-about` }, about)), el("div", { className: "track", id: `${name}-track` }, range), field);
     }));
   }
@@ -257,44 +236,17 @@ class Playground extends HTMLElement {
     const key = JSON.stringify([...this.drawn.legend]);
     if (this.tools === key) return;
     this.tools = key;
-    const entries = [["drone", "choose", { hasDrone: true }], ...[...this.drawn.legend].map(([letter, cell]) => [letter, letter === "S" ? "start" : cellName(cell).replace("floor", "empty").replace("ends the episode", "ends").replace(" of ", " "), { isStart: letter === "S" }])];
-    const floor = this.drawn.legend.get(".");
-    this.at("tools").replaceChildren(...entries.map(([letter, label, how]) => {
-      const input = el("input", { type: "radio", name: "tool", value: letter, checked: letter === this.tool, "aria-label": letter === "drone" ? "choose a state" : `${label}, letter ${letter}` });
-      return el("label", { className: "tool", title: letter === "drone" ? "choose the state that is explained" : `draw: ${letter}` }, input, cellPicture(this.drawn.legend.get(letter) ?? floor, how), label);
-    }));
+    this.at("tools").replaceChildren(...toolButtons(this.drawn.legend, this.tool));
   }
 
   drawShare() {
-    const { now } = this, state = now.state !== null && now.state;
-    const options = { "--map": now.text === null ? now.map : OWN_MAP, "--gamma": plain(now.gamma), "--N": now.N, "--w": now.w, "--slip": now.slip, "--treasure": now.treasure, "--state": state || null, "--action": ACTIONS[now.action], "--foil": ACTIONS[now.foil] };
-    const words = Object.entries(options).filter(([, value]) => value !== null && value !== undefined);
-    this.at("command").textContent = ["trdlab gridworld", ...words.map(([name, value]) => `${name} ${typeof value === "number" ? plain(value) : value}`)].join(" ");
-    this.at("file").textContent = now.text === null ? `${now.map}.txt` : OWN_MAP;
+    this.at("command").textContent = commandOf(this.now);
+    this.at("file").textContent = this.now.text === null ? `${this.now.map}.txt` : OWN_MAP;
   }
 
-  /** Returns the address of this page with all that was chosen behind #. */
+  /** Returns the address of this page with all that was chosen. */
   link() {
-    const chosen = Object.entries(this.now).filter(([name, value]) => value !== null && (name === "map" || value !== DEFAULTS[name]));
-    return `${location.href.split("#")[0]}#${new URLSearchParams(chosen)}`;
-  }
-
-  readHash() {
-    const given = new URLSearchParams(location.hash.slice(1));
-    if (!location.hash.includes("=")) return false;
-    const within = (name, least, most) => {
-      const value = Number(given.get(name));
-      return given.get(name) !== null && value >= least && value <= most ? value : DEFAULTS[name];
-    };
-    const whole = (...of) => { const value = within(...of); return value === null ? null : Math.round(value); };
-    const map = given.get("map") in MAPS ? given.get("map") : DEFAULTS.map, state = given.get("state");
-    this.now = {
-      map, text: given.get("text"), state: /^\d+,\d+(,\d+)?$/.test(state) ? state : null,
-      gamma: within("gamma", 0, FIELDS.gamma[5]), N: whole("N", 0, FIELDS.N[5]), w: whole("w", 1, FIELDS.w[5]),
-      slip: within("slip", 0, 1), treasure: within("treasure", -FIELDS.treasure[5], FIELDS.treasure[5]),
-      action: whole("action", 0, 3), foil: whole("foil", 0, 3), sweeps: whole("sweeps", 0, MOST_SWEEPS),
-    };
-    return true;
+    return `${location.href.split("#")[0]}#${toHash(this.now)}`;
   }
 
   // ---- what a reader does ------------------------------------------------------------------------
@@ -313,7 +265,7 @@ class Playground extends HTMLElement {
     on("sweep", "click", () => this.change({ sweeps: (this.now.sweeps ?? 0) + 1 }));
     on("forget", "click", () => this.change({ sweeps: 0 }));
     on("solve", "click", () => this.change({ sweeps: null }));
-    on("flip-try", "click", () => this.change({ gamma: Number(this.nearest.toFixed(3)) }));
+    on("flip-try", "click", () => this.change({ gamma: Math.min(LIMITS.gamma[1], beyond(this.nearest, this.now.gamma)) }));
     on("copy", "click", () => this.copy(at("command").textContent, "The command is copied."));
     on("link", "click", () => this.copy(this.link(), "The link is copied: it opens this very page."));
     on("save", "click", () => this.save());
@@ -321,12 +273,16 @@ class Playground extends HTMLElement {
     on("grid", "click", (event) => this.touch(event.target.closest(".cell")));
     on("grid", "keydown", (event) => this.onKey(event));
     this.shadowRoot.addEventListener("keydown", (event) => event.stopPropagation()); // pages around it have keys of their own
-    window.addEventListener("hashchange", () => { if (this.readHash()) this.update(); });
+    window.addEventListener("hashchange", () => {
+      const chosen = fromHash(location.hash, MAPS);
+      if (chosen) this.now = chosen;
+      if (chosen) this.update();
+    });
   }
 
   set(name, input) {
-    const value = Number(input.value), isRange = input.type === "range";
-    const isGood = input.value !== "" && (isRange || input.checkValidity());
+    const value = Number(input.value), { badInput, rangeOverflow, rangeUnderflow } = input.validity;
+    const isGood = input.value !== "" && !badInput && !rangeOverflow && !rangeUnderflow && (input.step !== "1" || Number.isInteger(value));
     input.setAttribute("aria-invalid", String(!isGood));
     if (!isGood) return;
     const isAsDrawn = (name === "slip" && value === this.drawn.slip) || (name === "treasure" && value === treasureOf(this.drawn));

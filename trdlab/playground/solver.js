@@ -147,7 +147,7 @@ function wholeReturn(world, solution) {
  * Component i < N is the discounted reward of the steps i·w … (i+1)·w − 1; component N, the
  * residual, is (γP)^(N·w) applied to Q. It is not taken as a difference.
  */
-export function decompose(world, solution, horizon, width) {
+function decompose(world, solution, horizon, width) {
   const once = (what) => earlier(world, solution, what, false);
   let group = repeated(width, (what) => earlier(world, solution, what, true), nothing(solution.q.length));
   let rest = wholeReturn(world, solution);
@@ -170,7 +170,7 @@ export const vector = (components, state, action) => components.map(({ mean }) =
  * This is the one equation: the reward in front of γ^w times what the table says, the last two
  * entries folded into one.
  */
-export function sweep(world, gamma, width, table) {
+function sweep(world, gamma, width, table) {
   const q = table[0].map((_, row) => sum(table.map((of) => of[row])));
   const { policy } = greedy(q, q.map(Math.abs)), by = { gamma, policy }, rows = q.length;
   const shifted = table.map((mean) => repeated(width, (what) => earlier(world, by, what, false), { ...nothing(rows), mean }).mean);
@@ -180,13 +180,23 @@ export function sweep(world, gamma, width, table) {
   return target;
 }
 
-/** Returns a table of zeros, from which sweeps begin. */
-export const emptyTable = ({ states }, horizon) => Array.from({ length: horizon + 1 }, () => new Float64Array(A * states.length));
+/**
+ * Returns all that follows from a model and γ, N and w: its solution, components, totals, and where
+ * ties matter; with `sweeps` also the table after so many sweeps from zeros, and the one before it.
+ */
+export function solved(world, { gamma, N, w, sweeps = null }) {
+  const solution = solve(world, gamma), whole = totals(world, solution);
+  const all = { world, solution, totals: whole, components: decompose(world, solution, N, w), ambiguous: ambiguous(world, solution, whole, N * w), axis: { gamma, horizon: N, width: w } };
+  if (sweeps === null) return all;
+  let table = Array.from({ length: N + 1 }, () => new Float64Array(solution.q.length)), before = table;
+  for (let k = 0; k < sweeps; k++) [before, table] = [table, sweep(world, gamma, w, table)];
+  return { ...all, table, before };
+}
 
 // ---- totals without a discount, and ties that matter ---------------------------------------------
 
-/** Returns the rows' expected totals with γ = 1 under the policy, NaN where no total exists. */
-export function totals(world, { policy }) {
+/** Returns the rows’ expected totals with γ = 1 under the policy, NaN where no total exists. */
+function totals(world, { policy }) {
   const { isPaid, isEndless } = fate(world, policy), values = new Float64Array(world.states.length);
   settle(world, values, (s) => (isPaid[s] && !isEndless[s] ? lookAhead(world, 1, values, A * s + policy[s]) : [0, 0]));
   isEndless.forEach((is, s) => { if (is) values[s] = NaN; });
@@ -206,7 +216,7 @@ function reached(begin, edges) {
 }
 
 /** Returns the states in which actions tie that pay at other steps, or other totals. */
-export function ambiguous(world, solution, whole, steps) {
+function ambiguous(world, solution, whole, steps) {
   const found = new Uint8Array(world.states.length);
   if (!solution.tied.some(Boolean)) return found;
   const parts = [...decompose(world, solution, steps, 1).map(({ mean }) => [mean, RELATIVE_ZERO]), [whole, SAME_TOTAL]];

@@ -12,11 +12,11 @@ const DECIDES = 0.8; // of all that differs: what lies at one step decides
 const LEAST_DISCOUNT = 2.2250738585072014e-308 ** 0.25; // what is smaller cannot be taken out
 
 /** Returns what is known of one state: an entry for each action, and what ties there. */
-export function momentOf(solved, state) {
-  const { world, solution, components, totals, ambiguous, axis } = solved;
+export function momentOf({ world, solution, components, totals, ambiguous, axis }, state) {
   const rows = ACTIONS.map((_, a) => 4 * state + a), vectors = rows.map((_, a) => vector(components, state, a));
   const later = following(world, solution, state);
   return {
+    state,
     axis,
     vectors,
     q: vectors.map(sum),
@@ -57,6 +57,20 @@ export function headline(moment, { action, foil }) {
   return [...brief.map(([, text]) => text), ...ties(moment)];
 }
 
+/** Says how far sweeps have come, and how far that is from the solution. */
+export function sweepWords(moment, choice, { table, components, world, axis }, sweeps) {
+  if (moment.isOver) return headline(moment, choice);
+  const pair = [choice.action, choice.foil].filter((a) => a >= 0), listed = (q) => pair.map((a) => `${name(a)} ${said(q(a))}`).join(" and ");
+  const apart = Math.max(...table.map((of, i) => of.reduce((most, value, row) => Math.max(most, Math.abs(value - components[i].mean[row])), 0)));
+  const now = listed((a) => sum(table.map((of) => of[4 * moment.state + a]))), then = listed((a) => moment.q[a]);
+  const isThere = apart <= 1e-9 * Math.max(...world.reward.map(Math.abs)), group = axis.width === 1 ? "step" : counted(axis.width, "step");
+  return [
+    sweeps ? `After ${counted(sweeps, "sweep")} the values are: ${now}.` : "Before the first sweep nothing is expected anywhere.",
+    isThere ? "The sweeps have found the solution." : sentence`Solved, they are: ${then}. Over the whole map, the component that is furthest off is off by ${number(apart)}.`,
+    `Each sweep puts the reward of the next ${group} in front, and moves all that was known one component on.`,
+  ];
+}
+
 /** Says where the preference changes sides as γ varies: at the nearest values below and above. */
 export function flipSentences(moment, { action, foil }, roots) {
   const { q, axis: { gamma } } = moment, worse = q[action] > q[foil] ? foil : action;
@@ -67,6 +81,12 @@ export function flipSentences(moment, { action, foil }, roots) {
     const where = second === null ? (nearest < gamma ? "below" : "above") : `between ${said(low, digits)} and`;
     return sentence`${name(worse)} would be better if γ were ${where} ${said(second === null ? nearest : high, digits)} instead of ${plain(gamma)}.`;
   });
+}
+
+/** Says that the preference stays the same whatever γ is. */
+export function neverFlips({ q }, { action, foil }) {
+  const [better, worse] = q[action] > q[foil] ? [action, foil] : [foil, action];
+  return `Whatever γ was, within the values tried, ${name(better)} is better than ${name(worse)}.`;
 }
 
 const name = (a) => ACTIONS[a];

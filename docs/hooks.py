@@ -27,6 +27,8 @@ from mkdocs.livereload import LiveReloadServer
 from mkdocs.structure import files as structure
 from mkdocs.structure.pages import Page
 
+from trdlab.playground import script
+
 DOCS = Path(__file__).parent
 _FROM_THE_NETWORK = re.compile(
     r'<(?:script|img|iframe)[^>]* src="https?:[^"]*|<link[^>]* href="https?:[^"]*'
@@ -61,7 +63,8 @@ def on_config(config: MkDocsConfig) -> None:
 
 
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
-    """Adds a page for each lesson, its pictures, and the scripts themselves to download."""
+    """Adds the playground, a page for each lesson, its pictures, and the scripts to download."""
+    files.append(structure.File.generated(config, "assets/playground.js", content=script()))
     scripts = sorted(_tutorials(config).glob("*.py"))
     lessons = [script for script in scripts if script.name[0].isdigit()]
     for script in scripts:

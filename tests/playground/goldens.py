@@ -35,7 +35,7 @@ SHIPPED = [
     {"gamma": 0.5, "N": 0, "w": 1, "treasure": 5.0},
     {"gamma": 0.99, "N": 3, "w": 4, "treasure": -2.0, "slip": 0.05},
 ]
-RANDOM = 60
+RANDOM = 40
 MOST_STATES = 300
 LETTERS = ".....cCtThHfE^v<>##"
 Settings = dict[str, Any]

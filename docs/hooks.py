@@ -28,6 +28,8 @@ from mkdocs.structure import files as structure
 from mkdocs.structure.pages import Page
 from notebooks import lessons
 
+from trdlab.playground import script
+
 DOCS = Path(__file__).parent
 _FROM_THE_NETWORK = re.compile(
     r'<(?:script|img|iframe)[^>]* src="https?:[^"]*|<link[^>]* href="https?:[^"]*'
@@ -62,7 +64,8 @@ def on_config(config: MkDocsConfig) -> None:
 
 
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
-    """Adds the lessons."""
+    """Adds the playground and the lessons."""
+    files.append(structure.File.generated(config, "assets/playground.js", content=script()))
     add_lessons(files, config)
     return files
 

@@ -28,7 +28,7 @@ from mkdocs.structure import files as structure
 from mkdocs.structure.pages import Page
 from notebooks import lessons
 
-from trdlab.playground import script
+from trdlab import playground
 
 DOCS = Path(__file__).parent
 _FROM_THE_NETWORK = re.compile(
@@ -65,7 +65,8 @@ def on_config(config: MkDocsConfig) -> None:
 
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
     """Adds the playground and the lessons."""
-    files.append(structure.File.generated(config, "assets/playground.js", content=script()))
+    script = playground.script()
+    files.append(structure.File.generated(config, "assets/playground.js", content=script))
     add_lessons(files, config)
     return files
 

@@ -29,6 +29,11 @@ import trdlab
 
 DOCS = Path(__file__).parent
 DECK, SLIDES, ARCHIVE = "teach/deck.html", "teach/slides.md", "teach/figures.zip"
+_DRAW = "python -c 'import trdlab; "
+_BARS = (
+    _DRAW + 'p = trdlab.explain("gridworld:{0}", parts="contrast", episodes=0).plot(); '
+    'p.set_size_inches(9, 5); p.savefig("{0}-bars.svg")\''
+)
 FIGURES = {
     "drone": (
         "The paper's example: up pays 4 late, down pays 1 four times.",
@@ -38,22 +43,27 @@ FIGURES = {
         "The same in groups of two steps.",
         "trdlab gridworld --map drone --N 2 --w 2 --plot drone-pairs.svg",
     ),
+    "drone-map": (
+        "The map alone.",
+        _DRAW + 'trdlab.agent("gridworld:drone").world.plot().savefig("drone-map.svg")\'',
+    ),
+    "drone-bars": ("The vectors alone, wide enough for a slide.", _BARS.format("drone")),
     "ledge": (
         "A world with chance: whiskers show how far single episodes differ from the average.",
         "trdlab gridworld --map ledge --N 4 --plot ledge.svg",
     ),
+    "ledge-bars": ("Its vectors alone.", _BARS.format("ledge")),
     "bridge": (
         "The long way round, or the short one over the abyss.",
         "trdlab gridworld --map bridge --N 8 --plot bridge.svg",
     ),
-    "tie": (
+    "tie-bars": (
         "Two actions of the same worth that pay at different times.",
-        "trdlab gridworld --map tie --N 3 --plot tie.svg",
+        _BARS.format("tie"),
     ),
     "trust": (
         "A calibration: the skill at each step, and that of a perfect forecast (dashed).",
-        "python -c 'import trdlab; "
-        'trdlab.calibrate("gridworld:ledge").plot().savefig("trust.svg")\'',
+        _DRAW + 'trdlab.calibrate("gridworld:ledge").plot().savefig("trust.svg")\'',
     ),
 }
 """What each figure shows, and the command that draws it."""
@@ -67,6 +77,7 @@ SHEET = {
 
 _EXERCISE = re.compile(r"^# \*\*Exercise (\S+)\.\*\* (.*(?:\n#(?! >).*)*)", re.MULTILINE)
 _RULER = re.compile(r"<hr\s*/?>")
+_SHORT = re.compile(r"<pre>(?=(?:(?!</pre>).*\n?){1,10}</pre>)")
 _LINK = re.compile(r'<a class="headerlink".*?</a>', re.DOTALL)
 _SOURCE = re.compile(r'src="(?:\.\./)*([^":]+)"')
 _CREDIT = """\
@@ -170,7 +181,8 @@ def deck(title: str, content: str, pictures: Files) -> str:
         kind = guess_type(path)[0]
         return f'src="data:{kind};base64,{b64encode(data).decode()}"'
 
-    parts = _RULER.split(_SOURCE.sub(inlined, _LINK.sub("", content)))
+    content = _SHORT.sub('<pre class="short">', _SOURCE.sub(inlined, _LINK.sub("", content)))
+    parts = _RULER.split(content)
     slides = "\n".join(f"<section>{part.strip()}</section>" for part in parts if part.strip())
     template = (DOCS / "deck.html").read_text(encoding="utf-8")
     return template.replace("{{ title }}", escape(title)).replace("{{ slides }}", slides)

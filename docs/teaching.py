@@ -45,7 +45,8 @@ FIGURES = {
     ),
     "drone-map": (
         "The map alone.",
-        _DRAW + 'trdlab.agent("gridworld:drone").world.plot().savefig("drone-map.svg")\'',
+        _DRAW + "from trdlab.show.plots.figures import figure; "
+        'figure(trdlab.agent("gridworld:drone").world).savefig("drone-map.svg")\'',
     ),
     "drone-bars": ("The vectors alone, wide enough for a slide.", _BARS.format("drone")),
     "ledge": (

@@ -78,7 +78,7 @@ SHEET = {
 
 _EXERCISE = re.compile(r"^# \*\*Exercise (\S+)\.\*\* (.*(?:\n#(?! >).*)*)", re.MULTILINE)
 _RULER = re.compile(r"<hr\s*/?>")
-_SHORT = re.compile(r"<pre>(?=(?:(?!</pre>).*\n?){1,10}</pre>)")
+_PRINTED = re.compile(r"<pre>(.*?)</pre>", re.DOTALL)
 _LINK = re.compile(r'<a class="headerlink".*?</a>', re.DOTALL)
 _SOURCE = re.compile(r'src="(?:\.\./)*([^":]+)"')
 _CREDIT = """\
@@ -182,7 +182,11 @@ def deck(title: str, content: str, pictures: Files) -> str:
         kind = guess_type(path)[0]
         return f'src="data:{kind};base64,{b64encode(data).decode()}"'
 
-    content = _SHORT.sub('<pre class="short">', _SOURCE.sub(inlined, _LINK.sub("", content)))
+    def sized(found: re.Match[str]) -> str:
+        is_short = found[1].count("\n") < 10
+        return f'<pre class="short">{found[1]}</pre>' if is_short else found[0]
+
+    content = _PRINTED.sub(sized, _SOURCE.sub(inlined, _LINK.sub("", content)))
     parts = _RULER.split(content)
     slides = "\n".join(f"<section>{part.strip()}</section>" for part in parts if part.strip())
     template = (DOCS / "deck.html").read_text(encoding="utf-8")

@@ -66,7 +66,7 @@ def test_every_statement_and_every_row_names_a_test() -> None:
     statements = re.split(r"(?m)^## (?=\d)", text(DOCS / "why" / "theorem.md"))[1:]
     assert len(statements) == 9
     for statement in statements:
-        assert "**Statement.**" in statement or "A *sweep*" in statement
+        assert "**Statement.**" in statement
         assert "∎" in statement
         assert "::test_" in statement.split("**Held by**")[1]
         assert 'exec="on"' in statement

@@ -54,6 +54,9 @@ SOLUTIONS = {
     "9.2": "0.03",
     "9.3": "-0.2",
     "9.4": "[3]",
+    "10.1": "[0.95 + 0.95**2, 0.95**3 + 0.95**4]",
+    "10.2": "4 + 0.5 * 2",
+    "10.3": "(1444 - 148) / (1324 - 148)",
 }
 
 
@@ -108,6 +111,7 @@ def test_lessons_are_found() -> None:
         "07_explain_your_own",
         "08_from_a_teacher",
         "09_which_pixels",
+        "10_the_paper_reproduced",
     ]
 
 

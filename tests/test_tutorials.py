@@ -301,6 +301,31 @@ def test_ninth_lesson_says_what_its_numbers_show() -> None:
     assert "Do not believe" in of_the_belt  # a false alarm: the lesson says why
 
 
+def test_tenth_lesson_shows_the_numbers_of_the_paper() -> None:
+    printed = printed_by(LESSONS[9])
+    for line in (
+        "up   [0.   0.   0.   0.   3.26] Q = 3.26",
+        "down [0.   0.95 0.9  0.86 0.81] Q = 3.52",
+        "in pairs: up [0.   0.   3.26] down [0.95 1.76 0.81]",
+        "learned on the sum: [0.7 0.7 0.7 0.7 0.7] Q 3.52",
+        "Q at N = 0 and N = 24: the same, to 1e-09",
+        "and 164 outputs, which is 4 · (40 + 1)",
+        f"      rows {LESSONS[9].read_text(encoding='utf-8').count('    Row('):3}",
+    ):
+        assert f"\n{line}\n" in printed
+
+
+def test_tenth_lesson_sees_that_wide_windows_keep_their_error() -> None:
+    """With w = 1 the limit is exact; with w > 1 learning ends where the limit is."""
+    row = r"^  N = +\d+, w = (\d) +([\d.]+) +(\S+) +(\S+)$"
+    found = re.findall(row, printed_by(LESSONS[9]), re.MULTILINE)
+    assert len(found) == 10
+    for width, score, error, limit in found:
+        assert float(score) > 0.999
+        assert (float(limit) == 0.0) == (width == "1")
+        assert width == "1" or 0.5 < float(error) / float(limit) < 2.0
+
+
 @pytest.mark.parametrize("name", exercise.EXERCISES)
 def test_check_explains_each_known_mistake(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     for wrong, said in exercise.EXERCISES[name].mistakes:

@@ -431,7 +431,10 @@ EXERCISES = {
         right=4 + 0.5 * 2,
         hint="Two rewards belong to a group of w = 2. The second one is a step later.",
         mistakes=(
-            (14, "That is the first row of Eq. 15 as printed: three, none discounted."),
+            (
+                14,
+                "That is the first row of Eq. 15 as printed: three, none discounted.",
+            ),
             (6, "Two rewards, but the second one is a step later. Discount it."),
             (4 + 1 + 2, "The sum ends at w − 1: that is one reward too many."),
         ),

@@ -109,7 +109,12 @@ def test_each_benchmark_is_there(name: str):
     assert (ROOT / name).is_file()
 
 
-@pytest.mark.parametrize("command", named(r"`(trdlab [^`]+)`"))
+def in_prose() -> list[str]:
+    source = LESSON.read_text(encoding="utf-8").replace("\\\n#", "")
+    return re.findall(r"^# \$ (trdlab .+)$", source, re.MULTILINE)
+
+
+@pytest.mark.parametrize("command", [*named(r"`(trdlab [^`]+)`"), *in_prose()])
 def test_each_command_is_one(command: str):
     parse(command)
 

@@ -937,7 +937,7 @@ Table(
         "above, on the drone's map",
         "Not trained: each run takes hours on a GPU. On the map all settings reach "
         f"{min(of['score'] for of in found.values()):.3f} of the optimum.",
-        "No teacher that is a DQN, and no such budget. `trdlab train atari` has all settings, and "
+        "No teacher that is a DQN, and no such budget. The trainer has all settings, and "
         "[four classic tasks](../train.md#the-other-classic-tasks) have been trained with N = "
         "0 and "
         "10, three seeds each (`python benchmarks/classic.py classic`).",
@@ -1040,7 +1040,7 @@ Table(
         "above",
         f"They do; at N = 400 a pass of the Atari network takes {far:.1%} more multiplications.",
         "So cost is a weak limit. That far steps are learned badly is a stronger one "
-        "([why](../train.md#which-γ-n-and-w)).",
+        "([why](../train.md#which-n-and-w)).",
     ),
     Row(
         "claim:evaluation",
@@ -1286,8 +1286,8 @@ Table(
         "partly",
         "[lesson 6](06_debug_an_agent.md), [Does it help?](../goals.md)",
         "Planted faults are named from data. Readers who were language models told goals apart.",
-        "Nobody has tried it on people, neither the paper nor trdlab. `trdlab study make` "
-        "makes the kit.",
+        "Nobody has tried it on people, neither the paper nor trdlab. "
+        "`trdlab study make --out kit` makes what it takes.",
     ),
     Row(
         "subsec:vis-temporal-decision-making",
@@ -1370,7 +1370,7 @@ Table(
         "",
         "A review of others.",
         "Parts of the reward, such as coins and a treasure, are combined with time here "
-        "(`trdlab fit --part`).",
+        "([how](../fit.md#what-not-only-when)).",
     ),
     Row(
         "sec:conclusion",
@@ -1378,6 +1378,7 @@ Table(
         "The claims of Sections 4 to 6 once more.",
         "partly",
         "the tables above",
+        "As there.",
         "As there.",
     ),
     Row(

@@ -1,9 +1,8 @@
 """Runs a lesson and turns it into a page: `python docs/lesson.py SCRIPT FOLDER`.
 
 A lesson is a script in `tutorials/`, cut into cells by `# %%` (code) and `# %% [markdown]` (prose
-in comments). Its page shows prose, code (that of `# %% folded` can be opened), what the code
-printed, the value of a cell's last expression, and the figures it drew. FOLDER gets the page,
-`page.md`, and the pictures.
+in comments). Its page shows prose, code, what the code printed, the value of a cell's last
+expression, and the figures it drew. FOLDER gets the page, `page.md`, and the pictures.
 """
 
 import ast
@@ -15,10 +14,9 @@ from collections.abc import Iterator
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from textwrap import indent
 from typing import Any
 
-_MARKER = re.compile(r"^# %%(?P<prose>.*\[markdown\])?(?P<folded> folded$)?.*$")
+_MARKER = re.compile(r"^# %%(?P<prose>.*\[markdown\])?.*$")
 
 
 class LessonError(Exception):
@@ -32,22 +30,14 @@ class Cell:
     text: str
     line: int
     is_prose: bool
-    is_folded: bool = False
-
-    @property
-    def code(self) -> str:
-        """Its code in Markdown."""
-        block = f"```python\n{self.text}\n```"
-        return f'??? example "Code"\n\n{indent(block, "    ")}' if self.is_folded else block
 
 
 @dataclass(frozen=True)
 class Output:
-    """What a code cell leaves behind: printed text, a last value, pictures as SVG."""
+    """What a code cell leaves behind: printed text, a last value as HTML, pictures as SVG."""
 
     text: str = ""
     html: str = ""
-    markdown: str = ""
     figures: tuple[bytes, ...] = ()
 
 
@@ -76,7 +66,7 @@ def lesson_page(script: Path) -> tuple[str, dict[str, bytes]]:
                 first = len(pictures) + 1
                 names = [f"{script.stem}-{first + i}.svg" for i in range(len(output.figures))]
                 pictures |= dict(zip(names, output.figures, strict=True))
-                blocks += [cell.code, *_shown(output, names)]
+                blocks += [f"```python\n{cell.text}\n```", *_shown(output, names)]
     finally:
         sys.path.remove(str(script.parent))
         plt.close("all")
@@ -86,22 +76,18 @@ def lesson_page(script: Path) -> tuple[str, dict[str, bytes]]:
 def split_cells(source: str) -> Iterator[Cell]:
     """Yields the cells of a script that are not blank; prose comes without its `# `."""
     lines = source.splitlines()
-    marks = [
-        (i, bool(m["prose"]), bool(m["folded"]))
-        for i, s in enumerate(lines)
-        if (m := _MARKER.match(s))
-    ]
-    if not marks or marks[0][0] > 0:  # code before the first marker
-        marks = [(-1, False, False), *marks]
-    ends = [*(i for i, *_ in marks[1:]), len(lines)]
-    for (start, is_prose, is_folded), end in zip(marks, ends, strict=True):
+    marks = [(i, bool(m["prose"])) for i, s in enumerate(lines) if (m := _MARKER.match(s))]
+    ends = [i for i, _ in marks[1:]] + [len(lines)]
+    if marks and marks[0][0] > 0:  # code before the first marker
+        marks, ends = [(-1, False), *marks], [marks[0][0], *ends]
+    for (start, is_prose), end in zip(marks or [(-1, False)], ends, strict=True):
         body = lines[start + 1 : end]
         while body and not body[0].strip():
             body, start = body[1:], start + 1
         if is_prose:
             body = [line.removeprefix("#").removeprefix(" ") for line in body]
         if text := "\n".join(body).rstrip():
-            yield Cell(text, line=start + 2, is_prose=is_prose, is_folded=is_folded)
+            yield Cell(text, line=start + 2, is_prose=is_prose)
 
 
 def run_cell(cell: Cell, namespace: dict[str, Any], script: Path) -> Output:
@@ -133,8 +119,6 @@ def run_cell(cell: Cell, namespace: dict[str, Any], script: Path) -> Output:
         return Output(text, figures=figures)
     if hasattr(value, "_repr_html_"):
         return Output(text, html=value._repr_html_())
-    if hasattr(value, "_repr_markdown_"):
-        return Output(text, markdown=value._repr_markdown_())
     return Output(f"{text}{value!r}\n")
 
 
@@ -162,8 +146,6 @@ def _shown(output: Output, pictures: list[str]) -> Iterator[str]:
         yield "\n".join(["```{.text .output}", *lines, "```"])
     if output.html:
         yield f'<div class="output">{output.html}</div>'
-    if output.markdown:
-        yield f'<div class="told" markdown>\n\n{output.markdown}\n\n</div>'
     for name in pictures:
         yield f"![Drawn by the cell above]({name}){{ .output }}"
 

@@ -7,11 +7,11 @@
 # each section, equation, figure, table and claim. What can be checked in seconds is checked while
 # this page is made. What cannot is said to be so.
 #
-# **Goal:** you can say of each part of the paper whether it holds, how you know, and what is
-# open. **Before it:** lessons [1](01_read_a_reward_vector.md) and [2](02_derive_it.md);
-# [4](04_why_the_sum_fails.md), [8](08_from_a_teacher.md) and [9](09_which_pixels.md) tell more of
-# what is only named here. **Time:** an hour to read all of it; the computer needs about half a
-# minute on two cores.
+# - **Goal:** say of each part of the paper whether it holds, how you know, and what is open.
+# - **Before it:** lessons [1](01_read_a_reward_vector.md) and [2](02_derive_it.md);
+#   [4](04_why_the_sum_fails.md), [8](08_from_a_teacher.md) and [9](09_which_pixels.md) tell more of
+#   what is only named here.
+# - **Time:** an hour to read all of it; half a minute to run, on two cores.
 
 # %% [markdown]
 # ## How to read the tables
@@ -67,8 +67,7 @@ from trdlab.tabular import (
     undiscounted_totals,
 )
 from trdlab.tabular.models import from_arrays
-
-from exercise import check
+from trdlab.teach import check
 
 torch.set_num_threads(1)  # such small networks are no faster with more
 
@@ -573,6 +572,15 @@ law_apart = np.abs(
     by_law.decomposition.components - solved.decomposition.components
 ).max()
 print(f"by Eq. 15, no component of any state and action is off by {law_apart:.1g}")
+
+# %% [markdown]
+# > **The formula.** With $r=\sum_{i=0}^{w-1}\gamma^i R_{t+i}$, and $n$ the vector of the next state,
+# > $s_{t+w}$, for its best action, Eq. 15 in its right form is a loss with $N+1$ rows:
+# >
+# > $$L=\mathbb{E}\Big[\big(q_0-r\big)^2+\sum_{i=1}^{N-1}\big(q_i-\gamma^w n_{i-1}\big)^2
+# > +\big(q_N-\gamma^w(n_{N-1}+n_N)\big)^2\Big]$$
+# >
+# > As printed it has $N+2$ rows, and $\sum_{i=0}^{w}R_{t+i}$ in place of $r$.
 
 # %% folded
 Table(
@@ -1640,6 +1648,7 @@ Table(
         "No agent of Ms. Pacman comes with trdlab. "
         "[Breakout](../figures.md#appendix-e-more-of-left-and-right) "
         "stands in its place.",
+        "With an agent, the same command draws it.",
     ),
 )
 
@@ -1686,9 +1695,9 @@ answer_3 = None  # replace with a number
 check("10.3", answer_3)
 
 # %% [markdown]
-# **To think about.** Two things are known that make w > 1 worse: random actions inside the
-# windows, and a buffer that bootstraps in the wrong state. Which experiment would tell how much
-# of Figure 3 is which? On which worlds would you do it first, and how many seeds would you need?
+# > **An open question.** Two things are known that make w > 1 worse: random actions inside the
+# > windows, and a buffer that bootstraps in the wrong state. Which experiment would tell how much of
+# > Figure 3 is which? On which worlds would you do it first, and how many seeds would you need?
 
 # %% [markdown]
 # ## What you have learned

@@ -28,8 +28,8 @@ EXERCISES = {
     "10.2": Exercise(
         right=4 + 0.5 * 2,
         solution=(
-            "A group of w = 2 has two rewards, 4 now and 2 a step later: 4 + 0.5 · 2 = 5. The 8 and "
-            "the 1 are in the next state's vector."
+            "A group of w = 2 has two rewards, 4 now and 2 a step later: 4 + 0.5 · 2 = 5. The 8 "
+            "and the 1 are in the vector of a later state."
         ),
         hint="Two rewards belong to a group of w = 2. The second one is a step later.",
         mistakes=(

@@ -62,6 +62,12 @@ def on_config(config: MkDocsConfig) -> None:
 
 
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
+    """Adds the lessons."""
+    add_lessons(files, config)
+    return files
+
+
+def add_lessons(files: structure.Files, config: MkDocsConfig) -> None:
     """Adds a page for each lesson, its pictures, and script and notebook to download."""
     scripts = lessons(_tutorials(config))
     for file in [*scripts, *(_tutorials(config) / "notebooks").glob("*.ipynb")]:
@@ -73,7 +79,6 @@ def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
         for name, content in made_of_it.items():
             uri = f"lessons/{script.stem}.md" if name == "page.md" else f"lessons/{name}"
             files.append(structure.File.generated(config, uri, content=content))
-    return files
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:

@@ -134,10 +134,11 @@ def lesson_page(script: Path, ran: NotebookNode) -> Files:
         first = len(pictures) + 1
         drawn = {f"{script.stem}-{i}.svg": svg for i, svg in enumerate(figures(shown), first)}
         pictures |= {name: svg.encode() for name, svg in drawn.items()}
-        blocks += [f"```python\n{cell.text}\n```", *_shown(shown, list(drawn))]
+        code = f"```python\n{cell.text}\n```"
+        blocks.append(_folded("example", "Code", code) if cell.is_folded else code)
+        blocks += _shown(shown, list(drawn))
         if cell.exercise:
-            worked = indent(EXERCISES[cell.exercise].solution, "    ")
-            blocks.append(f'??? success "Solution"\n\n{worked}')
+            blocks.append(_folded("success", "Solution", EXERCISES[cell.exercise].solution))
     return {"page.md": ("\n\n".join(blocks) + "\n").encode(), **pictures}
 
 
@@ -152,20 +153,25 @@ def figures(outputs: list[NotebookNode]) -> list[str]:
 
 
 def _shown(outputs: list[NotebookNode], pictures: list[str]) -> Iterator[str]:
-    """Yields the Markdown blocks of an output."""
-    text, html = printed(outputs), ""
-    for value in (of.data for of in outputs if of.output_type == "execute_result"):
-        if "text/html" in value:
-            html = value["text/html"]
-        elif not pictures:
-            text += value["text/plain"]
+    """Yields the Markdown blocks of what came of a cell."""
+    values = [of.data for of in outputs if of.output_type == "execute_result"]
+    value = {"image/svg+xml": ""} if pictures or not values else values[0]
+    text = printed(outputs)
+    if not value.keys() & {"image/svg+xml", "text/html", "text/markdown"}:
+        text += value["text/plain"]
     if text.strip():
         lines = [line.rstrip() for line in text.splitlines()]
         yield "\n".join(["```{.text .output}", *lines, "```"])
-    if html:
-        yield f'<div class="output">{html}</div>'
+    if "text/html" in value:
+        yield f'<div class="output">{value["text/html"]}</div>'
+    if "text/markdown" in value:
+        yield f'<div class="told" markdown>\n\n{value["text/markdown"]}\n\n</div>'
     for name in pictures:
         yield f"![Drawn by the cell above]({name}){{ .output }}"
+
+
+def _folded(kind: str, title: str, text: str) -> str:
+    return f'??? {kind} "{title}"\n\n{indent(text, "    ")}'
 
 
 def _admonition(box: re.Match[str]) -> str:

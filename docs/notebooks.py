@@ -1,8 +1,9 @@
 """Makes the notebooks of the lessons: `python docs/notebooks.py`.
 
-A lesson is a script in `tutorials/`, cut into cells by `# %%` (code) and `# %% [markdown]` (prose
-in comments). Its notebook has the same cells. Before them it installs trdlab, and below each
-exercise it holds the worked solution, folded away. The notebooks go to `tutorials/notebooks/`.
+A lesson is a script in `tutorials/`, cut into cells by `# %%` (code), `# %% folded` (code to be
+opened) and `# %% [markdown]` (prose in comments). Its notebook has the same cells. Before them it
+installs trdlab, and below each exercise it holds the worked solution, folded away. The notebooks go
+to `tutorials/notebooks/`.
 """
 
 import re
@@ -20,7 +21,7 @@ from trdlab.teach.checking import EXERCISES
 TUTORIALS = Path(__file__).parents[1] / "tutorials"
 NOTEBOOKS = TUTORIALS / "notebooks"
 
-_MARKER = re.compile(r"^# %%(?P<prose>.*\[markdown\])?.*$")
+_MARKER = re.compile(r"^# %%(?P<prose>.*\[markdown\])?(?P<folded> folded$)?.*$")
 _INSTALL = """\
 # trdlab is not on PyPI yet. In its source, `pip wheel --no-deps .` makes the file named here.
 # Put it beside this notebook. Where trdlab is installed already, leave this cell out.
@@ -35,6 +36,7 @@ class Cell:
     text: str
     line: int
     is_prose: bool
+    is_folded: bool = False
 
     @property
     def exercise(self) -> str | None:
@@ -51,18 +53,22 @@ def lessons(folder: Path = TUTORIALS) -> list[Path]:
 def split_cells(source: str) -> Iterator[Cell]:
     """Yields the cells of a script that are not blank; prose comes without its `# `."""
     lines = source.splitlines()
-    marks = [(i, bool(m["prose"])) for i, s in enumerate(lines) if (m := _MARKER.match(s))]
-    ends = [i for i, _ in marks[1:]] + [len(lines)]
-    if marks and marks[0][0] > 0:  # code before the first marker
-        marks, ends = [(-1, False), *marks], [marks[0][0], *ends]
-    for (start, is_prose), end in zip(marks or [(-1, False)], ends, strict=True):
+    marks = [
+        (i, bool(m["prose"]), bool(m["folded"]))
+        for i, s in enumerate(lines)
+        if (m := _MARKER.match(s))
+    ]
+    if not marks or marks[0][0] > 0:  # code before the first marker
+        marks = [(-1, False, False), *marks]
+    ends = [*(i for i, *_ in marks[1:]), len(lines)]
+    for (start, is_prose, is_folded), end in zip(marks, ends, strict=True):
         body = lines[start + 1 : end]
         while body and not body[0].strip():
             body, start = body[1:], start + 1
         if is_prose:
             body = [line.removeprefix("#").removeprefix(" ") for line in body]
         if text := "\n".join(body).rstrip():
-            yield Cell(text, line=start + 2, is_prose=is_prose)
+            yield Cell(text, line=start + 2, is_prose=is_prose, is_folded=is_folded)
 
 
 def notebook(source: str) -> nbformat.NotebookNode:
@@ -73,7 +79,8 @@ def notebook(source: str) -> nbformat.NotebookNode:
         if cell.is_prose:
             cells.append(v4.new_markdown_cell(_linked(cell.text)))
         else:
-            cells.append(v4.new_code_cell(cell.text))
+            hidden = {"jupyter": {"source_hidden": True}} if cell.is_folded else {}
+            cells.append(v4.new_code_cell(cell.text, metadata=hidden))
         if cell.exercise:
             cells.append(v4.new_markdown_cell(_FOLDED.format(EXERCISES[cell.exercise].solution)))
     for cell, number in zip(cells, count()):

@@ -12,8 +12,7 @@ with pytest.MonkeyPatch.context() as patch:
     import lesson as lessons
     import notebooks
 
-EVERYTHING = """\
-# %% [markdown]
+EVERYTHING = r"""# %% [markdown]
 # # Try
 #
 # Of [lesson 2](02_derive_it.md), and [errata C1](../errata.md#c1).
@@ -25,8 +24,16 @@ print("a  ")
 print("b", file=sys.stderr)
 x = 20
 
-# %% a name
+# %% folded
 x + 1
+
+# %%
+class Told:
+    def _repr_markdown_(self):
+        return "| a |\n|---|\n| b |"
+
+
+Told()
 
 # %%
 [x].sort()
@@ -60,8 +67,7 @@ from trdlab.teach import check
 answer_1 = None  # replace with a number
 check("1.1", answer_1)
 """
-PAGE = """\
-# Try
+PAGE = r"""# Try
 
 Of [lesson 2](02_derive_it.md), and [errata C1](../errata.md#c1).
 
@@ -79,13 +85,32 @@ x = 20
 a
 ```
 
-```python
-x + 1
-```
+??? example "Code"
+
+    ```python
+    x + 1
+    ```
 
 ```{.text .output}
 21
 ```
+
+```python
+class Told:
+    def _repr_markdown_(self):
+        return "| a |\n|---|\n| b |"
+
+
+Told()
+```
+
+<div class="told" markdown>
+
+| a |
+|---|
+| b |
+
+</div>
 
 ```python
 [x].sort()
@@ -161,11 +186,11 @@ def script(tmp_path: Path) -> Callable[[str], Path]:
 
 
 def test_cells_are_prose_or_code_and_know_their_line() -> None:
-    source = "import os\n\n# %% [markdown]\n# # Title\n#\n# Text.\n\n# %% a name\n\nx = 1\n\n# %%\n"
+    source = "import os\n\n# %% [markdown]\n# # Title\n#\n# Text.\n\n# %% folded\n\nx = 1\n\n# %%\n"
     assert list(notebooks.split_cells(source)) == [
         notebooks.Cell("import os", 1, is_prose=False),
         notebooks.Cell("# Title\n\nText.", 4, is_prose=True),
-        notebooks.Cell("x = 1", 10, is_prose=False),
+        notebooks.Cell("x = 1", 10, is_prose=False, is_folded=True),
     ]
     assert list(notebooks.split_cells("x = 1\n")) == [notebooks.Cell("x = 1", 1, is_prose=False)]
     assert list(notebooks.split_cells("")) == []
@@ -184,6 +209,8 @@ def test_a_notebook_installs_trdlab_leads_to_notebooks_and_folds_solutions_away(
         "<details>\n<summary>Solution</summary>\n\nComponent 2 is the reward at t+2,"
     )
     assert not any(cell.get("outputs") for cell in book.cells)
+    [folded] = [cell for cell in book.cells if cell.metadata]
+    assert (folded.source, folded.metadata.jupyter.source_hidden) == ("x + 1", True)
 
 
 def test_a_page_shows_what_came_of_each_cell_the_same_each_time(

@@ -17,6 +17,8 @@ from typing import Any
 
 import pytest
 
+from commands import parse
+
 pytest.importorskip("mkdocs")
 from mkdocs.exceptions import PluginError
 
@@ -281,17 +283,7 @@ def shown_commands() -> list[str]:
 
 @pytest.mark.parametrize("command", shown_commands())
 def test_every_command_that_is_shown_is_one(command: str) -> None:
-    from typer.main import get_command
-
-    from trdlab.cli.app import new_app
-
-    words = shlex.split(command, comments=True)[1:]
-    group: Any = get_command(new_app(words))
-    context = group.make_context("trdlab", words)
-    while hasattr(group, "resolve_command"):
-        rest = [*context._protected_args, *context.args]
-        name, group, rest = group.resolve_command(context, rest)
-        context = group.make_context(name, rest, parent=context)  # raises for an unknown option
+    parse(command)
 
 
 @pytest.fixture(scope="module")

@@ -56,6 +56,9 @@ SOLUTIONS: dict[str, Any] = {
     "9.2": 0.03,
     "9.3": -0.2,
     "9.4": [3],
+    "10.1": [0.95 + 0.95**2, 0.95**3 + 0.95**4],
+    "10.2": 4 + 0.5 * 2,
+    "10.3": (1444 - 148) / (1324 - 148),
 }
 
 
@@ -87,6 +90,7 @@ def test_lessons_are_found() -> None:
         "07_explain_your_own",
         "08_from_a_teacher",
         "09_which_pixels",
+        "10_the_paper_reproduced",
     ]
 
 
@@ -287,6 +291,31 @@ def test_ninth_lesson_says_what_its_numbers_show() -> None:
     assert [of[1:3] for of in hirescam] == [("good", "good")] * 2
     of_the_belt = printed[: printed.index("near: new weights")]
     assert "Do not believe" in of_the_belt  # a false alarm: the lesson says why
+
+
+def test_tenth_lesson_shows_the_numbers_of_the_paper() -> None:
+    printed = printed_by(LESSONS[9])
+    for line in (
+        "up   [0.   0.   0.   0.   3.26] Q = 3.26",
+        "down [0.   0.95 0.9  0.86 0.81] Q = 3.52",
+        "in pairs: up [0.   0.   3.26] down [0.95 1.76 0.81]",
+        "learned on the sum: [0.7 0.7 0.7 0.7 0.7] Q 3.52",
+        "Q at N = 0 and N = 24: the same, to 1e-09",
+        "and 164 outputs, which is 4 · (40 + 1)",
+        f"      rows {LESSONS[9].read_text(encoding='utf-8').count('    Row('):3}",
+    ):
+        assert f"\n{line}\n" in printed
+
+
+def test_tenth_lesson_sees_that_wide_windows_keep_their_error() -> None:
+    """With w = 1 the limit is exact; with w > 1 learning ends where the limit is."""
+    row = r"^  N = +\d+, w = (\d) +([\d.]+) +(\S+) +(\S+)$"
+    found = re.findall(row, printed_by(LESSONS[9]), re.MULTILINE)
+    assert len(found) == 10
+    for width, score, error, limit in found:
+        assert float(score) > 0.999
+        assert (float(limit) == 0.0) == (width == "1")
+        assert width == "1" or 0.5 < float(error) / float(limit) < 2.0
 
 
 def test_solution_of_the_treasure_makes_both_routes_equal() -> None:

@@ -13,6 +13,7 @@ from trdlab.teach import (
     lesson_07,
     lesson_08,
     lesson_09,
+    lesson_10,
 )
 from trdlab.teach.exercise import Exercise
 
@@ -26,6 +27,7 @@ EXERCISES: dict[str, Exercise] = {
     **lesson_07.EXERCISES,
     **lesson_08.EXERCISES,
     **lesson_09.EXERCISES,
+    **lesson_10.EXERCISES,
 }
 
 

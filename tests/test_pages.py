@@ -56,7 +56,7 @@ ONLY_PARSED = {
     r"--step (1[0-9]{2}|[2-9][0-9]{2})": "plays a game to that step",
     r"--weights": "of a checkpoint that takes minutes to reach",
     r"train atari Breakout$": "needs the teacher that comes with it",
-    r"--preset gpu|--device cuda": "needs a card",
+    r"--preset gpu|--device cuda$": "needs a card",
 }
 """Commands of which only the options are checked, and why."""
 
@@ -90,7 +90,7 @@ def test_every_command_on_a_page_is_one(page: Path) -> None:
             try:
                 parse(command)
             except USAGE_ERROR as error:
-                is_part = type(error).__name__ in ("MissingParameter", "NoArgsIsHelpError")
+                is_part = type(error).__name__ == "MissingParameter" or not str(error)
                 assert is_part and command not in whole, f"{command}: {error}"
 
 

@@ -106,7 +106,8 @@ def matches(shown: Shown, printed: str) -> bool:
     if shown.kind == "recorded":
         return True
     if shown.kind == "measured":
-        return {_bare(line) for line in told if line != "…"} <= set(map(_bare, lines))
+        bare = "\n".join(map(_bare, lines))
+        return all(f"\n{_bare(line)}" in f"\n{bare}" for line in told if line != "…")
     pattern = "\n".join(
         r"(?:.*\n)*?.*" if line == "…" else re.escape(line).replace("…", ".*") for line in told
     )

@@ -1,10 +1,7 @@
 """The machinery of the documentation: what is kept, lists of the reference, docstrings."""
 
 import importlib.util
-import json
-import os
 import re
-import shlex
 import subprocess
 import sys
 import threading
@@ -13,11 +10,8 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
 
 import pytest
-
-from commands import parse
 
 pytest.importorskip("mkdocs")
 from mkdocs.exceptions import PluginError
@@ -258,116 +252,6 @@ def test_every_name_that_a_package_exports_is_documented_once() -> None:
     exported = {name for package in packages for name in catalogue.exports(package, ROOT)}
     counts = {f"{file.stem}.{name}": documented[name, file] for name, file in exported}
     assert [f"{name}: {count} times" for name, count in counts.items() if count != 1] == []
-
-
-README, TRAIN = (ROOT / "README.md", ROOT / "docs" / "train.md")
-INSTALL = ROOT / "docs" / "install.md"
-RUN, GAME = "CartPole-v1-N10-w1-seed1", "Breakout-N40-w1-seed1"
-
-
-def blocks(page: Path, kind: str) -> list[str]:
-    """Returns the code blocks of one kind that are only shown, not run while the site is built."""
-    return re.findall(rf"^```{kind}\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S)
-
-
-def shown_commands() -> list[str]:
-    lines = [
-        line
-        for page in (README, INSTALL, TRAIN)
-        for block in blocks(page, "console")
-        for line in block.splitlines()
-    ]
-    told = [line.removeprefix("$ ") for line in lines if line.startswith("$ trdlab")]
-    return [line for line in told if line != "trdlab --version"]  # which parses nothing else
-
-
-@pytest.mark.parametrize("command", shown_commands())
-def test_every_command_that_is_shown_is_one(command: str) -> None:
-    parse(command)
-
-
-@pytest.fixture(scope="module")
-def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Returns a folder with runs of the names that the pages use, hardly trained."""
-    from trdlab.deep.presets import preset
-    from trdlab.training.run import begin, carry_on
-
-    folder = tmp_path_factory.mktemp("pages")
-    little = {
-        "agent_steps": 40,
-        "learning_starts": 20,
-        "capacity": 100,
-        "threads": 1,
-        "log_every": 9,
-    }
-    for kind, env, name in (("gym", "CartPole-v1", RUN), ("atari", "Breakout", GAME)):
-        settings = preset(kind, env).changed({**little, "num_envs": 2})
-        with begin(settings, folder / "runs" / name) as run:
-            assert carry_on(run)
-            held = {path.name for path in run.folder.path.iterdir()}
-    assert {".lock", ".holder.json"} <= held
-    return folder
-
-
-@pytest.mark.parametrize("page", [README, TRAIN], ids=lambda page: page.name)
-def test_the_python_that_is_shown_runs(
-    page: Path, trained: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(trained)
-    monkeypatch.setenv("MPLBACKEND", "agg")
-    shown = blocks(page, "python")
-    assert len(shown) >= 3
-    namespace: dict[str, Any] = {}
-    for block in shown:
-        exec(block, namespace)
-    assert capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    "word",
-    ["Component", "Residual", "Q", "Total", "Chosen", "Stays here", "Mostly stays", "Tie", "Worth",
-     "In total", "The other action** (`--foil`)", "Skill", "trusted to t+3", "Not tested"],
-)  # fmt: skip
-def test_the_words_of_the_output_are_explained_on_one_page(word: str) -> None:
-    assert f"**{word}" in (ROOT / "docs" / "output.md").read_text(encoding="utf-8")
-
-
-def test_the_readme_shows_what_the_command_prints() -> None:
-    """If this fails, paste what it prints now."""
-    words = shlex.split("gridworld --gamma 0.95 --N 2 --w 2")
-    command = [sys.executable, "-m", "trdlab", *words]
-    env = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
-    printed = subprocess.run(command, capture_output=True, encoding="utf-8", env=env, check=True)
-    lines = "\n".join(line.rstrip() for line in printed.stdout.splitlines())
-    [shown] = blocks(README, "text")
-    assert shown in lines
-
-
-def test_the_files_of_a_run_are_those_of_the_table(trained: Path) -> None:
-    run = trained / "runs" / RUN
-    section = TRAIN.read_text(encoding="utf-8").split("## What lies")[1].split("\n## ")[0]
-    rows = [line for line in section.splitlines() if line.startswith(("| `", "| …"))]
-    told = {name for row in rows for name in re.findall(r"`([\w./]+)`", row.split(" | ")[0])}
-    top = {path.name + "/" * path.is_dir() for path in run.iterdir()} | {".holder.json"}
-    top |= {"tensorboard/"}  # if asked for
-    [checkpoint] = (run / "checkpoints").iterdir()
-    held = {path.name for path in checkpoint.iterdir()}
-    assert told == (top - {"checkpoints/"}) | held | {"checkpoints/000100000/"}
-    metrics = json.loads((run / "metrics.jsonl").read_text().splitlines()[-1])
-    row = next(row for row in rows if "metrics.jsonl" in row)
-    assert re.findall(r"`(\w+)`", row.split(" | ")[1])[1:] == list(metrics)
-
-
-def test_the_settings_are_those_that_the_numbers_on_the_page_were_made_with() -> None:
-    """If this fails, run the commands of docs/train.md again, and write down what they print."""
-    from trdlab.deep.presets import preset
-
-    config = preset("gym", "CartPole-v1").to_config()
-    names = ("N", "w", "gamma", "agent_steps", "num_envs", "learning_starts", "update_every")
-    assert [config[name] for name in names] == [10, 1, 0.99, 100_000, 8, 1_000, 2]
-    names = ("epsilon_end", "epsilon_steps", "batch_size", "learning_rate", "learning_rate_end")
-    assert [config[name] for name in names] == [0.04, 20_000, 64, 1e-3, 0.0]
-    assert (config["target_sync_updates"], config["hidden"]) == (128, [256, 256])
 
 
 def build(config: Path, site: Path) -> "subprocess.CompletedProcess[str]":

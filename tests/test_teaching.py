@@ -17,9 +17,9 @@ import pytest
 pytest.importorskip("mkdocs")
 import yaml
 from mkdocs.exceptions import PluginError
-from trdlab.teach.checking import EXERCISES
 
 import trdlab
+from trdlab.teach.checking import EXERCISES
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -1,19 +1,29 @@
-"""The command line as pages show it."""
+"""Whether the real application takes a command, without running it."""
 
-import shlex
 from typing import Any
 
+import typer
 
-def parse(command: str) -> None:
-    """Parses a command such as `trdlab explain gridworld:ledge`, and raises if it is none."""
+from pages import words_of
+from trdlab.cli.app import new_app
+
+USAGE_ERROR: Any = typer.BadParameter.__base__  # it has no public name in all versions
+
+
+def refusal(command: str) -> str | None:
+    """Returns why the real application does not take a command, without running it."""
     from typer.main import get_command
 
-    from trdlab.cli.app import new_app
-
-    words = shlex.split(command, comments=True)[1:]
+    words = words_of(command)[1:]
     group: Any = get_command(new_app(words))
-    context = group.make_context("trdlab", words)
-    while hasattr(group, "resolve_command"):
-        rest = [*context._protected_args, *context.args]
-        name, group, rest = group.resolve_command(context, rest)
-        context = group.make_context(name, rest, parent=context)  # raises for an unknown option
+    try:
+        context = group.make_context("trdlab", words)
+        while hasattr(group, "resolve_command"):
+            rest = [*context._protected_args, *context.args]
+            name, group, rest = group.resolve_command(context, rest)
+            context = group.make_context(name, rest, parent=context)
+    except typer.Exit:  # of --help and --version
+        return None
+    except USAGE_ERROR as error:
+        return str(error)
+    return None

@@ -16,6 +16,8 @@ _OPTIONS = {
     "env_arguments": "--env-arg",
 }
 """Of arguments that are called otherwise on the command line."""
+_HEAVY = {"torch": "PyTorch", "ale_py": "ale-py"}
+"""What a light installation leaves out (light.txt), by the name of the import."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -37,6 +39,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if isinstance(error, NotImported):
             cure = f"If you trust it, add: --import {error.module}"
         _fail(as_options(f"{error.cause} {cure}".strip()), error.exit_code)
+    except ModuleNotFoundError as error:
+        if error.name not in _HEAVY or {"-v", "--verbose"} & set(words):
+            raise
+        cause = f"This needs {_HEAVY[error.name]}, which a light installation leaves out."
+        _fail(f"{cause} Run: pip install trdlab", 1)
     except usage_error as error:
         if not error.format_message():  # no command was given, and the help has been printed
             sys.exit(2)

@@ -66,5 +66,5 @@ LOWEST_TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(VENV)-lowest/bin/pyte
 $(VENV)-lowest/installed: constraints.txt pyproject.toml .ci/lowest.py
 	$(PYTHON) -m venv $(VENV)-lowest
 	$(PYTHON) .ci/lowest.py > $(VENV)-lowest/constraints.txt
-	$(LOWEST_PIP) -c $(VENV)-lowest/constraints.txt -e . pytest pytest-xdist hypothesis
+	$(LOWEST_PIP) -c $(VENV)-lowest/constraints.txt -e . pytest pytest-xdist hypothesis jsonschema
 	touch $@

@@ -83,7 +83,7 @@ def _table(package: Path, root: Path, is_meant: Choice) -> Iterator[str]:
     named = list(exports(package, root))
     listed = [(name, home) for name, home in named if is_meant(name)]
     for module in [] if named else _chosen(package, is_meant):
-        listed += [(name, module) for name, _ in public(module)]
+        listed += [(name, module) for name, of in public(module) if ast.get_docstring(of)]
     rows = [
         f"| [`{name}`][{_module(home, root)}.{name}] | {_about(name, home)} |"
         for name, home in listed

@@ -4,13 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test test-lowest lint types imports unit docs bench clean
+.PHONY: demo test test-lowest lint types imports unit docs site-check bench clean
 
 demo: $(VENV)/installed
 	$(BIN)/trdlab gridworld --gamma 0.95 --N 2 --w 2
 	$(BIN)/trdlab explain pretrained:Breakout --step 200 --what forecast --episodes 0
 
-test: lint types imports unit docs
+test: lint types imports unit docs site-check
 
 lint: $(VENV)/installed-tests
 	$(BIN)/ruff check .
@@ -23,11 +23,14 @@ imports: $(VENV)/installed-tests
 	$(BIN)/lint-imports
 
 unit: $(VENV)/installed-tests
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2  # one thread for each worker
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 -m "not site"  # one thread for each worker
 
 docs: $(VENV)/installed-tests
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo 'Open site/index.html in a browser.'
+
+site-check: $(VENV)/installed-tests  # of the pages that `make docs` has built
+	$(BIN)/pytest -n 2 tests/site
 
 # With the lowest versions that we declare, and then with the lowest Gymnasium that has Atari games.
 # They have wheels for Python 3.11 and 3.12.
@@ -63,5 +66,5 @@ LOWEST_TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(VENV)-lowest/bin/pyte
 $(VENV)-lowest/installed: constraints.txt pyproject.toml .ci/lowest.py
 	$(PYTHON) -m venv $(VENV)-lowest
 	$(PYTHON) .ci/lowest.py > $(VENV)-lowest/constraints.txt
-	$(LOWEST_PIP) -c $(VENV)-lowest/constraints.txt -e . pytest pytest-xdist hypothesis
+	$(LOWEST_PIP) -c $(VENV)-lowest/constraints.txt -e . pytest pytest-xdist hypothesis jsonschema
 	touch $@

@@ -2,24 +2,32 @@
 
 A line of a page such as `<!-- names: trdlab.explanations.moment -->` is replaced by a list:
 
-- `table: P`: what package P exports, a row for each name with the first sentence about it;
+- `table: P`: what package P exports, a row for each name with the first sentence about it; of a
+  package that exports nothing, what its modules define;
 - `names: P`: the same in full, but only what lies in P itself and not deeper; P may be a room of
   the package that exports it;
 - `modules: P`: the modules of P that define something public, each in full;
 - `sentences: P`: a section on what the rules in the modules of P say, and when; none without rules.
+
+Where a page would be too long, `P only a b` lists a part, and `P except a b` the rest: exported
+names, or modules where nothing is exported.
 """
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from docstrings import prepared
 
-_LINE = re.compile(r"^<!-- (table|names|modules|sentences): ([\w.]+) -->$", re.MULTILINE)
+_LINE = re.compile(
+    r"^<!-- (table|names|modules|sentences): ([\w.]+)(?: (only|except) ([\w ]+))? -->$",
+    re.MULTILINE,
+)
 
 Definition = ast.ClassDef | ast.FunctionDef
+Choice = Callable[[str], bool]
 
 
 def expanded(markdown: str, root: Path) -> str:
@@ -37,7 +45,12 @@ def expanded(markdown: str, root: Path) -> str:
         package = root.joinpath(*found[2].split("."))
         if not (package / "__init__.py").is_file():
             raise LookupError(f"there is no package {found[2]}")
-        blocks = list(_LISTS[found[1]](package, root))
+        part, word = set((found[4] or "").split()), found[3]
+
+        def is_meant(name: str) -> bool:
+            return not word or (name in part) == (word == "only")
+
+        blocks = list(_LISTS[found[1]](package, root, is_meant))
         if blocks or found[1] == "sentences":
             return "\n".join(blocks)
         raise LookupError(f"there are no {found[1]} to list of {found[2]}")
@@ -66,30 +79,38 @@ def exports(package: Path, root: Path) -> Iterator[tuple[str, Path]]:
             yield name, homes.get(name, package / "__init__.py")
 
 
-def _table(package: Path, root: Path) -> Iterator[str]:
+def _table(package: Path, root: Path, is_meant: Choice) -> Iterator[str]:
+    named = list(exports(package, root))
+    listed = [(name, home) for name, home in named if is_meant(name)]
+    for module in [] if named else _chosen(package, is_meant):
+        listed += [(name, module) for name, of in public(module) if ast.get_docstring(of)]
     rows = [
         f"| [`{name}`][{_module(home, root)}.{name}] | {_about(name, home)} |"
-        for name, home in exports(package, root)
+        for name, home in listed
     ]
     yield from ["| name | what it is |", "|---|---|", *rows] if rows else []
 
 
-def _names(package: Path, root: Path) -> Iterator[str]:
+def _names(package: Path, root: Path, is_meant: Choice) -> Iterator[str]:
     exporter = package if list(exports(package, root)) else package.parent
     for name, home in exports(exporter, root):
-        if home.parent == package:
+        if home.parent == package and is_meant(name):
             yield _in_full(f"{_dotted(exporter, root)}.{name}")
 
 
-def _modules(package: Path, root: Path) -> Iterator[str]:
-    for module in sorted(package.glob("[!_]*.py")):
+def _modules(package: Path, root: Path, is_meant: Choice) -> Iterator[str]:
+    for module in _chosen(package, is_meant):
         if any(public(module)):
             yield _in_full(_dotted(module.with_suffix(""), root), path=True)
 
 
-def _sentences(package: Path, root: Path) -> Iterator[str]:
+def _chosen(package: Path, is_meant: Choice) -> list[Path]:
+    return [path for path in sorted(package.glob("[!_]*.py")) if is_meant(path.stem)]
+
+
+def _sentences(package: Path, root: Path, is_meant: Choice) -> Iterator[str]:
     heading = "## What it can say\n\nThe kinds of sentences, and when each is said.\n"
-    for module in sorted(package.glob("[!_]*.py")):
+    for module in _chosen(package, is_meant):
         known = _constants(module)
         rules = [
             (kind, says, ast.get_docstring(node))

@@ -1,24 +1,27 @@
 """What MkDocs does beside turning Markdown into pages: lessons, commands, and the reference.
 
-The lessons of `tutorials/` are run, each in a kernel of its own, and become pages; so do the
-commands on the pages. Neither is run again before its sources change: the results are kept in
-`.cache/docs/`. Nothing else is written into the work tree.
+The lessons of `tutorials/` are run, each in a kernel of its own, and become pages; the commands
+on the pages are run, and the lists of the reference filled in. Neither a lesson nor a command is
+run again before its sources change: the results are kept in `.cache/docs/`. There, in `pages/`,
+lies also what comes of it all: plain Markdown, from which another program can build the site.
+Nothing else is written into the work tree.
 """
 
+import json
 import logging
 import os
 import re
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
+from shutil import rmtree
 from time import perf_counter
 from typing import Any
 
-import markdown_exec
 from catalogue import expanded
+from executed import BlockError, Run, executed, outputs
 from kept import Files, fingerprint, made
 from lesson import LessonError, lesson_page, lesson_run
 from mkdocs.config.defaults import MkDocsConfig
@@ -50,24 +53,16 @@ def on_startup(**_: Any) -> None:
     os.environ |= _PLAIN
 
 
-def on_config(config: MkDocsConfig) -> None:
-    """Takes the place of the plugin that runs commands, and keeps what they print."""
-    cache = _cache(config)
-
-    def run(code: str, returncode: int = 0, **_: Any) -> str:
-        return command_output(code, returncode, cache)
-
-    def bash(**options: Any) -> str:
-        return markdown_exec.base_format(language="bash", run=run, **options)
-
-    markdown_exec.formatters["bash"] = bash
-
-
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
-    """Adds the playground and the lessons."""
+    """Adds the playground and the lessons, and makes every page plain Markdown."""
     script = playground.script()
     files.append(structure.File.generated(config, "assets/playground.js", content=script))
     add_lessons(files, config)
+    pages = files.documentation_pages()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # the first that fails ends it
+        for page, text in zip(pages, pool.map(lambda of: plain(of, config), pages), strict=True):
+            page.content_string = text
+    write_pages(files, _cache(config))
     return files
 
 
@@ -85,19 +80,27 @@ def add_lessons(files: structure.Files, config: MkDocsConfig) -> None:
             files.append(structure.File.generated(config, uri, content=content))
 
 
-def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Fills in the lists of a page, and notes when the work on it begins."""
-    page.meta["begun"] = perf_counter()
+def plain(page: structure.File, config: MkDocsConfig) -> str:
+    """Returns the Markdown of a page with its lists, and with what its commands print."""
     try:
-        return expanded(markdown, _package().parent)
-    except LookupError as error:
-        raise PluginError(f"{page.file.src_uri}: {error}") from error
+        listed = expanded(page.content_string, _package().parent)
+        return executed(listed, lambda run: kept_outputs(run, _cache(config)))
+    except (LookupError, BlockError) as error:
+        raise PluginError(f"{page.src_uri}: {error}") from error
 
 
-def on_page_content(html: str, page: Page, **_: Any) -> None:
-    """Tells of a page that took long."""
-    if (seconds := perf_counter() - page.meta["begun"]) > _SLOW:
-        _log.info("Page %s: %.0f s", page.file.src_uri, seconds)
+def write_pages(files: structure.Files, cache: Path) -> None:
+    """Writes all pages and what they show into `pages/`, and settings to build them with.
+
+    Zensical, which succeeds MkDocs, reads the settings of MkDocs, but runs no hooks.
+    """
+    folder = cache / "pages"
+    rmtree(folder, ignore_errors=True)
+    for file in files:
+        if file.inclusion.is_included():
+            path = folder / file.src_uri
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(file.content_bytes)
 
 
 def on_post_page(output: str, page: Page, **_: Any) -> str:
@@ -132,34 +135,26 @@ def lesson(script: Path, cache: Path) -> Files:
         raise PluginError(str(error)) from error
 
 
-def command_output(code: str, returncode: int, cache: Path) -> str:
-    """Returns what a command of a page prints, run if it has to be.
+def kept_outputs(run: Run, cache: Path) -> list[str]:
+    """Returns what blocks of a page print, run if they have to be.
 
     Raises:
-        ExecutionError: it ends with another code than the one that is expected.
+        BlockError: one of them fails.
     """
-    folder = Path.cwd()  # of the block; its files, such as a map, count among the sources
+    folder = Path(run.workdir).absolute()  # its files, such as a map, count among the sources
     own = [folder] if folder.is_relative_to(DOCS) else []
 
     def make() -> Files:
         begun = perf_counter()
-        done = subprocess.run(
-            ["bash", "-c", code],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-        )
-        if done.returncode != returncode:
-            said = markdown_exec.code_block("sh", done.stdout)
-            raise markdown_exec.ExecutionError(said, done.returncode)
+        printed = outputs(run)
         if (seconds := perf_counter() - begun) > _SLOW:
-            _log.info("Command %s: %.0f s", code.strip().splitlines()[-1], seconds)
-        return {"output.txt": done.stdout.encode()}
+            _log.info("Block %s: %.0f s", run.codes[-1].strip().splitlines()[-1], seconds)
+        return {"outputs.json": json.dumps(printed).encode()}
 
-    thing = f"command-{sha256(f'{folder} {code}'.encode()).hexdigest()[:16]}"
-    files = made(cache, thing, lambda: fingerprint(code, *own, str(_PLAIN), _package()), make)
-    return files["output.txt"].decode()
+    thing = f"block-{sha256(repr(run).encode()).hexdigest()[:16]}"
+    files = made(cache, thing, lambda: fingerprint(repr(run), *own, str(_PLAIN), _package()), make)
+    printed: list[str] = json.loads(files["outputs.json"])
+    return printed
 
 
 def _package() -> Path:

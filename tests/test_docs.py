@@ -32,6 +32,7 @@ def _load(name: str) -> ModuleType:
 with pytest.MonkeyPatch.context() as patch:
     patch.syspath_prepend(ROOT / "docs")  # as MkDocs does for a hook
     hooks, catalogue, kept = _load("hooks"), _load("catalogue"), _load("kept")
+    blocks_of = _load("executed")
     docstrings = _load("docstrings")
 
 
@@ -196,8 +197,11 @@ def rooms(tmp_path: Path) -> Path:
     [
         ("names: rooms", ["::: rooms.Door"]),
         ("names: rooms.kitchen", ["::: rooms.bake"]),
+        ("names: rooms only Door bake", ["::: rooms.Door"]),
         ("modules: rooms.kitchen", ["::: rooms.kitchen.oven"]),
+        ("modules: rooms.kitchen except garden", ["::: rooms.kitchen.oven"]),
         ("table: rooms", ["[`Door`][rooms.door.Door] | A door. |", "| Bakes a dish. |"]),
+        ("table: rooms.kitchen", ["[`bake`][rooms.kitchen.oven.bake] | Bakes a dish. |"]),
         (
             "sentences: rooms.kitchen",
             [
@@ -221,7 +225,10 @@ def test_lists_of_the_reference_are_read_from_the_source(
     assert "<!--" not in page
 
 
-@pytest.mark.parametrize("line", ["names: rooms.garden", "table: rooms.kitchen"])
+@pytest.mark.parametrize(
+    "line",
+    ["names: rooms.garden", "table: rooms except Door bake", "modules: rooms.kitchen except oven"],
+)
 def test_a_list_of_nothing_is_refused(rooms: Path, line: str) -> None:
     with pytest.raises(LookupError, match=line.split()[1]):
         catalogue.expanded(f"<!-- {line} -->", rooms)
@@ -286,6 +293,75 @@ def test_the_page_for_missing_pages_finds_its_files_on_disk_too() -> None:
     assert hooks.on_post_template(html, template_name="sitemap.xml") == html
 
 
+def test_what_blocks_print_takes_their_place() -> None:
+    page = """A.
+
+```bash exec="on" source="above" result="{.text .output}"
+cd . # hide
+echo '``` b'
+```
+
+- C
+
+    ```python exec="on" session="s"
+    x = 1
+    ```
+
+    ```python exec="on" session="s"
+    print(f"**{x + 1}**")
+    ```
+
+```python
+print("is only shown")
+```
+
+```bash exec="on" html="on"
+echo '<p>D</p>'
+```
+"""
+    assert (
+        blocks_of.executed(page, blocks_of.outputs)
+        == """A.
+
+````bash
+echo '``` b'
+````
+
+````{.text .output}
+``` b
+````
+
+- C
+
+
+
+    **2**
+
+```python
+print("is only shown")
+```
+
+<div class="made">
+<p>D</p>
+</div>
+"""
+    )
+
+
+@pytest.mark.parametrize(
+    ("block", "message"),
+    [
+        ('bash exec="on"\nexit 3\n', "exit code 3"),
+        ('python exec="on"\nmissing\n', "NameError: name 'missing'"),
+        ('bash exec="on" tabs="a"\ntrue\n', "no such option: tabs"),
+        ('ruby exec="on"\ntrue\n', "only bash and python are run"),
+    ],
+)
+def test_a_block_that_fails_says_why(block: str, message: str) -> None:
+    with pytest.raises(blocks_of.BlockError, match=message):
+        blocks_of.executed(f"```{block}```\n", blocks_of.outputs)
+
+
 @pytest.mark.parametrize(("command", "ok"), [("trdlab --help", True), ("trdlab nonsense", False)])
 def test_a_command_that_fails_on_a_page_fails_the_build(
     tmp_path: Path, command: str, ok: bool
@@ -293,7 +369,7 @@ def test_a_command_that_fails_on_a_page_fails_the_build(
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "index.md").write_text(f'# T\n\n```bash exec="on"\n{command}\n```\n')
     (tmp_path / "mkdocs.yml").write_text(
-        f"site_name: T\nplugins: [markdown-exec]\nhooks: ['{ROOT / 'docs' / 'hooks.py'}']\n"
+        f"site_name: T\nhooks: ['{ROOT / 'docs' / 'hooks.py'}']\n"
         "markdown_extensions: [pymdownx.superfences]\n"
         "theme: {name: mkdocs, highlightjs: false}\n"
     )

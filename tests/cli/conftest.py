@@ -1,11 +1,22 @@
 """What the tests of several commands share."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
+import jsonschema
 import pytest
 
-from trdlab.cli import main
+from trdlab.cli import common, main
+
+SCHEMA = json.loads(
+    (Path(__file__).parents[2] / "docs" / "reference" / "trdlab.schema.json").read_text("utf-8")
+)
+KINDS = {
+    of["properties"]["schema"]["const"]: name
+    for name, of in SCHEMA["$defs"].items()
+    if "schema" in of.get("properties", {})
+}
 
 Outcome = tuple[int, str, str]
 Trdlab = Callable[..., Outcome]
@@ -43,3 +54,17 @@ def trained(tmp_path_factory) -> Path:
         clip_rewards=True,
         env_arg=["slip=0.2"],
     )
+
+
+@pytest.fixture(autouse=True)
+def every_json_is_as_the_schema_says(monkeypatch) -> None:
+    """Holds each JSON that a test prints against the schema in the documentation."""
+    print_json = common.print_json
+
+    def checked(data: object) -> None:
+        kind = KINDS[data["schema"]] if isinstance(data, dict) else "maps"
+        schema = {"$defs": SCHEMA["$defs"], "$ref": f"#/$defs/{kind}"}
+        jsonschema.validate(json.loads(json.dumps(data)), schema)
+        print_json(data)
+
+    monkeypatch.setattr(common, "print_json", checked)

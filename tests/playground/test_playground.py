@@ -292,8 +292,10 @@ def test_the_link_and_the_command_are_copied(visit):
     opened = visit("map=tie", permissions=["clipboard-read", "clipboard-write"])
     for button, copied in (("Copy command", "trdlab gridworld --map tie"), ("Copy link", "file:")):
         opened.page.get_by_role("button", name=button).click()
-        opened.page.wait_for_function("document.querySelector('trdlab-playground').shadowRoot"
-                                      ".getElementById('copied').textContent")
+        opened.page.wait_for_function(
+            "document.querySelector('trdlab-playground').shadowRoot"
+            ".getElementById('copied').textContent"
+        )
         assert opened.page.evaluate("navigator.clipboard.readText()").startswith(copied)
 
 

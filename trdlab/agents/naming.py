@@ -95,7 +95,7 @@ def find_agent(
 
 
 def gridworld_agent(map_name: str, time_axis: TimeAxis, **where: Any) -> Agent:
-    """Returns `find_agent` of a built-in map or a map file, on a time axis."""
+    """Returns `find_agent` of `map_name`, a built-in map or a map file, on a time axis."""
     return find_agent(GRIDWORLD + map_name.removeprefix(GRIDWORLD), **asdict(time_axis), **where)
 
 

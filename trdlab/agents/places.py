@@ -203,7 +203,11 @@ def _mdp_of(env: Any) -> MDP | None:
 
 
 def refuse_arguments(name: str, env_arguments: Sequence[str]) -> None:
-    """Refuses arguments of an exact model that do not stand in its name."""
+    """Refuses arguments of an exact model that do not stand in its name.
+
+    Raises:
+        InputError: there are some.
+    """
     if env_arguments:
         raise InputError(
             f"`env_arguments` are for Gymnasium environments, and '{name}' is an exact model.",

@@ -78,7 +78,10 @@ class AtariGame(gym.Env[Frames, np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Frames, dict[str, Any]]:
-        """Begins a game; with a seed, all that follows is a function of it and of the actions."""
+        """Begins a game; with a seed, all that follows is a function of it and of the actions.
+
+        There are no `options`.
+        """
         super().reset(seed=seed)
         if seed is not None or not self._begun:  # a seeded reset costs 15 times as much
             told: dict[str, Any] = {"seed": np.array([self.np_random.integers(2**31)])}

@@ -75,7 +75,7 @@ class GreyAndColour:
         return self.grey.reset()
 
     def step(self, actions: IntArray, active: BoolArray | None = None) -> Step:
-        """Takes actions `[B]`; where a game ends, the next one begins in the same call.
+        """Takes actions `[B]`, of the `active` games; where one ends, the next begins in this call.
 
         Raises:
             InputError: there are not B actions, or one does not exist.

@@ -167,7 +167,11 @@ class NatureNetwork(DecompositionNetwork):
         self.middle.copy_(torch.as_tensor(seen).float().mean(dim=0) / 255.0)
 
     def preprocess(self, observations: Tensor) -> Tensor:
-        """Returns `[B, C, H, W]`, from 0 to 1, less the mean image if that is known."""
+        """Returns `[B, C, H, W]`, from 0 to 1, less the mean image if that is known.
+
+        Raises:
+            InputError: the images have another shape or type.
+        """
         self._check_shape(observations)
         if observations.dtype != torch.uint8:
             raise InputError(
@@ -236,7 +240,11 @@ class VectorNetwork(DecompositionNetwork):
         self.scale.copy_(torch.as_tensor(1.0 / np.where(spread > 1e-8, spread, 1.0)))
 
     def preprocess(self, observations: Tensor) -> Tensor:
-        """Returns `[B, F]`: flattened, or one-hot."""
+        """Returns `[B, F]`: flattened, or one-hot.
+
+        Raises:
+            InputError: the observations have another shape, or a state does not exist.
+        """
         self._check_shape(observations)
         if self.num_states is None:
             return (observations.flatten(1).float() - self.middle) * self.scale  # [B, F]

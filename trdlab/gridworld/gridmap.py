@@ -100,14 +100,14 @@ class GridMap:
         return row, self.rows[row].index("S")
 
     def cell(self, row: int, column: int) -> Cell:
-        """Returns what is at a place; outside the map there is wall."""
+        """Returns what is at a row and column, counted from 0; outside the map there is wall."""
         rows, columns = self.shape
         if 0 <= row < rows and 0 <= column < columns:
             return self.legend[self.rows[row][column]]
         return LEGEND["#"]
 
     def changed(self, *, slip: float | None = None, treasure: float | None = None) -> "GridMap":
-        """Returns the map with another slip, or other treasures, where these are given."""
+        """Returns the map with another slip, or each `treasure` worth another value."""
         grid = self if slip is None else self.with_slip(slip)
         return grid if treasure is None else grid.with_value("treasure", treasure)
 
@@ -149,7 +149,7 @@ def map_text(name: str) -> str:
 
 
 def load_map(name_or_file: str | Path) -> GridMap:
-    r"""Returns a built-in map by its name, or reads one from a file.
+    r"""Returns a built-in map by its name, or reads one from a file: `name_or_file`.
 
     Raises:
         MapError: there is no such map or file, or it cannot be read.

@@ -48,7 +48,9 @@ def script() -> str:
         "LAYOUT": _read("layout.html"),
         "STYLE": _read("style.css"),
     }
-    data = [f"const {name} = {json.dumps(of, separators=(',', ':'))};\n" for name, of in held.items()]
+    data = [
+        f"const {name} = {json.dumps(of, separators=(',', ':'))};\n" for name, of in held.items()
+    ]
     modules = [_EXPORT.sub("", _IMPORT.sub("", _read(f"{name}.js"))) for name in MODULES]
     return "\n".join(['"use strict";', "{", *data, *modules, "}", ""])
 

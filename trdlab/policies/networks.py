@@ -181,7 +181,11 @@ class Network:
         return np.asarray(told.numpy())
 
     def tensor(self, observations: Any) -> Tensor:
-        """Returns observations as the network takes them: `[B, *seen]`, states by number as n."""
+        """Returns observations as the network takes them: `[B, *seen]`, states by number as n.
+
+        Raises:
+            InputError: they have another shape.
+        """
         seen = np.asarray(observations)
         if seen.ndim == 1 and seen.dtype.kind in "iu":
             seen = seen[:, None] == np.arange(self.seen[0])  # [B, n]

@@ -95,17 +95,17 @@ class Critique:
         return self.gamma == self.time_axis.gamma
 
     def is_off(self, which: int) -> bool:
-        """Returns whether the critic (0), or the forecasts (1), surely are off by a tenth."""
+        """Returns whether `which`, the critic (0) or forecasts (1), surely is off by a tenth."""
         slack = SLACK * self.size[which]
         return bool(self.bias.low[which] > slack or self.bias.high[which] < -slack)
 
     def is_uneven(self, which: int) -> bool:
-        """Returns whether its slope is so far from 1 that it surely is off by a tenth."""
+        """Returns whether the slope of `which` is so far from 1 that it surely matters."""
         low, high = self.slope.low[which] - 1.0, self.slope.high[which] - 1.0
         return bool(max(low, -high) * self.spread[which] > SLACK * self.size[which])
 
     def is_wrong(self, which: int) -> bool:
-        """Returns whether it surely is wrong."""
+        """Returns whether the critic or the forecasts, `which`, surely are wrong."""
         return self.is_off(which) or self.is_uneven(which)
 
     @property

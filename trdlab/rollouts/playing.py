@@ -238,7 +238,11 @@ class Playing:
         return Decision(told, self.last_seen()[1] if self._policy else own)
 
     def last_seen(self) -> tuple[Any, FloatArray]:
-        """Returns the true last observations, and how likely the policy takes each action there."""
+        """Returns the true last observations, and how likely the policy takes each action there.
+
+        Raises:
+            TypeError: nobody was given who acts.
+        """
         if self._policy is None:
             raise TypeError("Nobody was given who acts.")
         memory = rows(self._memory, self.finished[self._asked])

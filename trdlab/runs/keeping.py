@@ -91,7 +91,11 @@ def announce(run: RunFolder, folder: Path, blocks: Mapping[str, Sum]) -> None:
 
 
 def forget(run: RunFolder, step: int, newest: Path, keep: int) -> None:
-    """Deletes what the newest checkpoint replaces, and the oldest ones but for the best."""
+    """Deletes what the newest checkpoint replaces, and the oldest ones but for the best.
+
+    Raises:
+        OutputError: a file cannot be deleted.
+    """
     saved = all_saved(run)
     valid = [each for each in saved if each.step < step or each.folder == newest]
     kept = {*valid[max(0, len(valid) - keep) :], best_of(valid)}

@@ -37,7 +37,7 @@ class RunSummary:
 
 
 def list_runs(parent: Path) -> list[RunSummary]:
-    """Returns a summary of each run in a folder, by name; a torn one has a row that says so."""
+    """Returns a summary of each run in `parent`, by name; a torn one has a row that says so."""
     return [_summary(path) for path in run_paths(parent)]
 
 

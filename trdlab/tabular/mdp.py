@@ -111,7 +111,11 @@ class MDP:
     ) -> "MDP":
         """Builds a model from `transitions[s][a]`, a list of (probability, s′, reward, terminated).
 
-        This is the layout of the `P` table of Gymnasium's toy-text environments.
+        This is the layout of the `P` table of Gymnasium's toy-text environments. Episodes begin in
+        the state `start`.
+
+        Raises:
+            InputError: nothing follows an action, or not all states have the same ones.
 
         >>> coin = MDP.from_transitions([[[(1.0, 0, 1.0, True)], [(1.0, 0, 0.0, False)]]])
         >>> coin.num_states, coin.num_actions, coin.expected_rewards.tolist()

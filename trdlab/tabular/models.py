@@ -186,7 +186,11 @@ def _at(
 def check_finite(
     probabilities: FloatArray, rewards: FloatArray, place: Callable[[int], tuple[int, int]]
 ) -> None:
-    """Refuses numbers that are not finite; `place` tells a transition's state and action."""
+    """Refuses numbers that are not finite; `place` tells a transition's state and action.
+
+    Raises:
+        InputError: there are some; the message names the first.
+    """
     for what, values in (("probability", probabilities), ("reward", rewards)):
         if not np.isfinite(values).all():
             bad = int(np.argmin(np.isfinite(values)))

@@ -113,7 +113,11 @@ def operator_table(mdp: MDP, time_axis: TimeAxis, epsilon: float) -> OperatorTab
 
 
 def check_epsilon(epsilon: float) -> None:
-    """Refuses an ε outside [0, 1]."""
+    """Refuses an ε outside [0, 1].
+
+    Raises:
+        InputError: it is outside.
+    """
     if not 0.0 <= epsilon <= 1.0:
         raise InputError(f"ε is {epsilon}.", "It must be from 0 to 1.")
 

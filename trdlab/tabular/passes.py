@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from trdlab.arrays import BoolArray, FloatArray, IntArray
-from trdlab.tabular.chains import FINE, LEAST, endless
+from trdlab.tabular.chains import FINE, LEAST, Chain, endless
 from trdlab.tabular.mdp import take_rows
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ _TRIES = 40  # passes
 _MOSTLY_OVER = 0.25  # a likeliest step below which most futures end
 
 
-class Sparse:
+class Sparse(Chain):
     """A large chain, by passes in the order of its flow; inside, states are numbered in it."""
 
     def __init__(self, matrix: "csr_array") -> None:

@@ -205,7 +205,11 @@ class Saliency(Printable):
         return self.trust is not None and bool(self.trust.doubtful[group.components].any())
 
     def map(self, group: Group) -> SaliencyMap:
-        """Returns the map of some components, of an agent that sees images."""
+        """Returns the map of some components, of an agent that sees images.
+
+        Raises:
+            TypeError: it sees no images.
+        """
         if not isinstance(self.of, Places):
             raise TypeError("there are no maps of vectors")
         return self.of.maps.of(group)

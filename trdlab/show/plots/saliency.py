@@ -79,7 +79,11 @@ def plot_saliency(
 
 
 def plot_entries(ax: Axes, saliency: Saliency) -> Axes:
-    """Draws what each entry adds to near and far reward as bars on `ax`, which is returned."""
+    """Draws what each entry adds to near and far reward as bars on `ax`, which is returned.
+
+    Raises:
+        TypeError: the agent sees images, which have no entries.
+    """
     of, groups = saliency.of, saliency.told
     if not isinstance(of, Entries):
         raise TypeError("images have maps")

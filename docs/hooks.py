@@ -27,7 +27,7 @@ from mkdocs.livereload import LiveReloadServer
 from mkdocs.structure import files as structure
 from mkdocs.structure.pages import Page
 
-from trdlab.playground import script
+from trdlab import playground
 
 DOCS = Path(__file__).parent
 _FROM_THE_NETWORK = re.compile(
@@ -64,7 +64,8 @@ def on_config(config: MkDocsConfig) -> None:
 
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
     """Adds the playground, a page for each lesson, its pictures, and the scripts to download."""
-    files.append(structure.File.generated(config, "assets/playground.js", content=script()))
+    element = structure.File.generated(config, "assets/playground.js", content=playground.script())
+    files.append(element)
     scripts = sorted(_tutorials(config).glob("*.py"))
     lessons = [script for script in scripts if script.name[0].isdigit()]
     for script in scripts:

@@ -48,13 +48,15 @@ def script() -> str:
         "LAYOUT": _read("layout.html"),
         "STYLE": _read("style.css"),
     }
-    data = [f"const {name} = {json.dumps(of, separators=(',', ':'))};\n" for name, of in held.items()]
+    data = [
+        f"const {name} = {json.dumps(of, separators=(',', ':'))};\n" for name, of in held.items()
+    ]
     modules = [_EXPORT.sub("", _IMPORT.sub("", _read(f"{name}.js"))) for name in MODULES]
     return "\n".join(['"use strict";', "{", *data, *modules, "}", ""])
 
 
 def page() -> str:
-    """Returns the page that `trdlab playground` shows: one file that loads nothing from anywhere."""
+    """Returns the page that `trdlab playground` shows: one file that needs nothing else."""
     code, style = script().replace("</", "<\\/"), _read("page.css")
     hashes = {"{script_hash}": _hash(code), "{style_hash}": _hash(style)}
     made = _read("page.html")

@@ -1,7 +1,7 @@
 // The page: what is chosen, what follows from it, and how a reader changes it.
 // MAPS, ICONS, LAYOUT and STYLE are put in front by trdlab/playground/__init__.py.
 
-import { ACTIONS, buildWorld, changed, findState, mapText, parseMap, treasureOf } from "./world.js";
+import { ACTIONS, buildWorld, changed, findState, mapText, parseMap, statesLike, treasureOf } from "./world.js";
 import { isSame, solved, sum } from "./solver.js";
 import { choose, delta, flipSentences, headline, momentOf, neverFlips, sweepWords } from "./words.js";
 import { drawBars, drawContrast, drawLegend, drawMap, drawTable, el, symbols, toolButtons } from "./pictures.js";
@@ -44,7 +44,8 @@ class Playground extends HTMLElement {
     try {
       const drawn = parseMap(text);
       this.drawn = drawn;
-      this.grid = changed(drawn, { slip: now.slip, treasure: treasureOf(drawn) === null ? null : now.treasure });
+      if (treasureOf(drawn) === null) now.treasure = null; // there is none, or they differ
+      this.grid = changed(drawn, now);
       this.solved = solved(buildWorld(this.grid), now);
       this.fault("");
     } catch (error) {
@@ -54,6 +55,7 @@ class Playground extends HTMLElement {
       this.fault(error.message);
     }
     this.draw();
+    this.at("flip").classList.add("unknown");
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.later(), PAUSE);
   }
@@ -106,13 +108,7 @@ class Playground extends HTMLElement {
 
   /** Draws the map, with what is worth what: as solved, or as far as sweeps have come. */
   drawGrid(drone) {
-    const { solved: { world, solution, table, before } } = this, stateAt = new Map(), width = this.grid.rows[0].length;
-    if (drone) {
-      world.states.forEach(({ row, column, collected }, s) => {
-        const place = row * width + column, isLike = collected.join() === drone.collected.join();
-        if (isLike || !stateAt.has(place)) stateAt.set(place, s);
-      });
-    }
+    const { solved: { world, solution, table, before } } = this, stateAt = drone ? statesLike(world, drone) : new Map();
     const best = (of) => world.states.map((_, s) => [0, 1, 2, 3].map((a) => sum(of.map((part) => part[4 * s + a]))));
     const shown = table ? best(table) : null, last = table ? best(before) : null;
     const values = shown ? shown.map((q) => Math.max(...q)) : solution.values;
@@ -170,8 +166,8 @@ class Playground extends HTMLElement {
       at("contrast-title").textContent = `${names.join(" minus ")}: above the line is what speaks for ${names[0]}, below it what speaks for ${names[1]}`;
       drawContrast(at("contrast"), { row: contrast, axis, names });
     }
-    const caption = `Expected discounted reward at row ${row}, column ${column}${before ? ", as swept so far" : ""}`;
-    drawTable(at("table"), { vectors, contrast, totals: before ? null : moment.totals, choice, axis, caption });
+    at("caption").textContent = `Expected discounted reward at row ${row}, column ${column}${before ? ", as swept so far" : ""}`;
+    drawTable(at("table"), { vectors, contrast, totals: before ? null : moment.totals, choice, axis });
   }
 
   /** Shows where the choice flips: none where that was not looked for, `[]` where it never does. */
@@ -179,6 +175,7 @@ class Playground extends HTMLElement {
     const { at, now: { gamma }, moment, choice } = this, flips = roots ?? [];
     const told = flipSentences(moment, choice, flips).join(" ") || (roots ? neverFlips(moment, choice) : instead);
     const where = flips.length ? ["The choice flips at γ = ", el("b", { id: "flip-at" }, flips.map((root) => root.toPrecision(5)).join(", ")), ". "] : [];
+    at("flip").classList.remove("unknown");
     at("flip-words").replaceChildren(...where, told);
     at("flip-try").hidden = !flips.length;
     this.nearest = flips.toSorted((a, b) => Math.abs(a - gamma) - Math.abs(b - gamma))[0];
@@ -275,8 +272,10 @@ class Playground extends HTMLElement {
     this.shadowRoot.addEventListener("keydown", (event) => event.stopPropagation()); // pages around it have keys of their own
     window.addEventListener("hashchange", () => {
       const chosen = fromHash(location.hash, MAPS);
-      if (chosen) this.now = chosen;
-      if (chosen) this.update();
+      if (!chosen) return; // a heading of the page around it
+      this.now = chosen;
+      this.update();
+      this.scrollIntoView();
     });
   }
 

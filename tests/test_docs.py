@@ -16,7 +16,11 @@ from typing import Any
 import pytest
 
 pytest.importorskip("mkdocs")
+from mkdocs.config import load_config
 from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import Files
+
+from trdlab.playground import script
 
 ROOT = Path(__file__).parents[1]
 
@@ -52,6 +56,19 @@ def lesson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], P
         return lesson_of.lesson_page(script)
 
     return page
+
+
+def test_the_playground_of_the_site_is_that_of_the_package(tmp_path: Path) -> None:
+    for folder in ("docs", "tutorials"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "mkdocs.yml").write_text("site_name: trdlab\n", encoding="utf-8")
+    config = load_config(str(tmp_path / "mkdocs.yml"))
+    config.plugins._current_plugin = "docs/hooks.py"  # as while MkDocs calls a hook
+    files = hooks.on_files(Files([]), config)
+    made = files.get_file_from_path("assets/playground.js")
+    assert made is not None
+    assert made.content_string == script()
+    assert 'src="assets/playground.js"' in (ROOT / "docs" / "playground.md").read_text("utf-8")
 
 
 def test_cells_are_prose_or_code_and_know_their_line() -> None:

@@ -46,12 +46,13 @@ class Playground extends HTMLElement {
       this.drawn = drawn;
       if (treasureOf(drawn) === null) now.treasure = null; // there is none, or they differ
       this.grid = changed(drawn, now);
-      this.solved = solved(buildWorld(this.grid), now);
+      const key = JSON.stringify({ ...now, map: text, state: 0, action: 0, foil: 0 });
+      if (key !== this.key) this.solved = solved(buildWorld(this.grid), now);
+      this.key = key;
       this.fault("");
     } catch (error) {
       if (!("cure" in error)) throw error;
-      if (!this.solved) Object.assign(this.now, { text: null }); // there is nothing else to show
-      if (!this.solved) this.update();
+      if (!this.solved) this.change({ text: null }); // there is nothing else to show
       this.fault(error.message);
     }
     this.draw();
@@ -63,10 +64,10 @@ class Playground extends HTMLElement {
   /** Does what takes longer, once nothing changes for a moment: the flips, and the address. */
   later() {
     if (this.isChanged) history.replaceState(null, "", this.link());
-    const { world } = this.solved ?? {}, isShown = world && !this.isFaulty && this.now.sweeps === null && this.choice?.foil >= 0;
-    if (!isShown) return this.showFlips(null);
+    const { solved: { world }, state, choice, moment } = this;
+    if (!choice) return; // nobody sees the page yet
+    if (this.isFaulty || this.now.sweeps !== null || choice.foil < 0) return this.showFlips(null);
     if (world.states.length > MOST_FLIP_STATES) return this.showFlips(null, "With so many states, other discounts are not tried here.");
-    const { state, choice, moment } = this;
     this.showFlips(isSame(moment.q[choice.action], moment.q[choice.foil]) ? null : flipsOfGamma(world, this.now.gamma, state, choice.action, choice.foil));
   }
 
@@ -141,7 +142,7 @@ class Playground extends HTMLElement {
     const { moment, choice, now, solved } = this, [first, ...more] = solved.table ? sweepWords(moment, choice, solved, now.sweeps) : headline(moment, choice);
     if (this.at("says").textContent !== first) this.at("says").textContent = first;
     this.at("more").replaceChildren(...more.map((text) => el("li", {}, text)));
-    const framed = now.sweeps ? " Framed in yellow: what the last one changed." : "";
+    const framed = now.sweeps ? " Framed in violet: what the last one changed." : "";
     this.at("status").textContent = now.sweeps === null ? `Solved exactly: ${counted(solved.world.states.length, "state")}.` : `After ${counted(now.sweeps, "sweep")} from nothing.${framed}`;
     this.at("forget").disabled = now.sweeps === 0;
     this.at("solve").disabled = now.sweeps === null;

@@ -55,8 +55,8 @@ def on_startup(**_: Any) -> None:
 
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
     """Adds the playground and the lessons, and makes every page plain Markdown."""
-    script = playground.script()
-    files.append(structure.File.generated(config, "assets/playground.js", content=script))
+    element = structure.File.generated(config, "assets/playground.js", content=playground.script())
+    files.append(element)
     add_lessons(files, config)
     pages = files.documentation_pages()
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # the first that fails ends it

@@ -84,11 +84,11 @@ def case(text: str, settings: Settings) -> dict[str, Any]:
     settings = {k: v for k, v in settings.items() if k != "treasure" or has_treasure}
     world = Gridworld(grid.changed(treasure=settings.get("treasure")))
     table = exact(world.mdp, axis)
-    S = len(world.states)
-    shown = sorted({0, *np.linspace(0, S - 1, 4).astype(int).tolist()})
+    count = len(world.states)
+    shown = sorted({0, *np.linspace(0, count - 1, 4).astype(int).tolist()})
     states = [state_of(world, table, state, with_flips=state == 0) for state in shown]
     swept = sweeps(world.mdp, axis, 5)[shown] if axis.width == 1 else None
-    found = {"text": text, **settings, "num_states": S, "states": states}
+    found = {"text": text, **settings, "num_states": count, "states": states}
     return found | ({} if swept is None else {"swept": rounded(swept)})
 
 

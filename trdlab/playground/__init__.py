@@ -56,7 +56,7 @@ def script() -> str:
 
 
 def page() -> str:
-    """Returns the page that `trdlab playground` shows: one file that loads nothing from anywhere."""
+    """Returns the page that `trdlab playground` shows: one file that needs nothing else."""
     code, style = script().replace("</", "<\\/"), _read("page.css")
     hashes = {"{script_hash}": _hash(code), "{style_hash}": _hash(style)}
     made = _read("page.html")

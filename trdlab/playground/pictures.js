@@ -18,6 +18,8 @@ export function el(name, properties = {}, ...children) {
   return made;
 }
 
+const shown = (value, digits = 3) => said(value, digits).replace(/^-/, "−");
+
 export function svg(name, attributes = {}, ...children) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -93,25 +95,25 @@ export function drawMap(box, { grid, drone, stateAt, values, policy, news, over 
       el("div", { role: "gridcell", className: "cell", tabIndex: row + column ? -1 : 0, "data-row": row, "data-column": column })
     )))));
   }
-  for (const shown of box.querySelectorAll(".cell")) {
-    const row = Number(shown.dataset.row), column = Number(shown.dataset.column), place = row * width + column;
+  for (const tile of box.querySelectorAll(".cell")) {
+    const row = Number(tile.dataset.row), column = Number(tile.dataset.column), place = row * width + column;
     const cell = legend.get(rows[row][column]), s = stateAt.get(place), isHere = drone?.row === row && drone?.column === column;
     const isTaken = !!drone && paysOnce(cell) && drone.collected.includes(place), isStart = rows[row][column] === "S";
     const strength = wind ? wind.strengths[wind.direction < 2 ? column : row] : 0;
     const look = { isStart, isTaken, hasDrone: isHere, wind: wind && { direction: wind.direction, strength } }, key = JSON.stringify([cell, look]);
-    if (shown.dataset.key !== key) shown.replaceChildren(cellPicture(cell, look), el("span", { className: "worth" }));
-    shown.dataset.key = key;
-    const isWorth = s !== undefined && !over[s], worth = shown.lastChild;
+    if (tile.dataset.key !== key) tile.replaceChildren(cellPicture(cell, look), el("span", { className: "worth" }));
+    tile.dataset.key = key;
+    const isWorth = s !== undefined && !over[s], worth = tile.lastChild;
     worth.hidden = !isWorth;
     let told = `row ${row}, column ${column}: ${isStart ? "start, " : ""}${cellName(cell)}${isTaken ? ", taken" : ""}`;
     if (isWorth) {
-      worth.replaceChildren(ARROWS[policy[s]], el("span", {}, ` ${said(values[s], 2)}`));
+      worth.replaceChildren(ARROWS[policy[s]], el("span", {}, ` ${shown(values[s], 2)}`));
       told += `; worth ${said(values[s], 3)}, best is ${ACTIONS[policy[s]]}`;
     }
-    shown.classList.toggle("here", isHere);
-    shown.classList.toggle("news", s !== undefined && news.has(s));
-    shown.setAttribute("aria-selected", String(isHere));
-    shown.setAttribute("aria-label", told + (isHere ? "; the drone is here" : ""));
+    tile.classList.toggle("here", isHere);
+    tile.classList.toggle("news", s !== undefined && news.has(s));
+    tile.setAttribute("aria-selected", String(isHere));
+    tile.setAttribute("aria-label", told + (isHere ? "; the drone is here" : ""));
   }
 }
 
@@ -142,14 +144,15 @@ const kindOf = (a, { action, foil }) => (a === action ? "a-one" : a === foil ? "
 
 /** Draws for each action a bar of its components: rewards to the right of zero, costs to the left. */
 export function drawBars(box, { vectors, choice, axis, news }) {
-  const width = Math.max(220, box.clientWidth), left = 52, right = 58, step = 34, top = 4, { horizon } = axis;
+  const width = Math.max(220, box.clientWidth), { horizon } = axis, told = vectors.map((row) => shown(sum(row)));
+  const left = 52, right = 14 + 8 * Math.max(...told.map((text) => text.length)), step = 34, top = 4;
   const ends = vectors.map((row) => [sum(row.filter((x) => x < 0)), sum(row.filter((x) => x > 0))]);
   const low = Math.min(0, ...ends.map(([x]) => x)), high = Math.max(...ends.map(([, x]) => x), low < 0 ? 0 : 1e-12);
   const height = top + 4 * step + 22, x = (value) => left + ((value - low) / (high - low)) * (width - left - right);
   const canvas = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": "A bar for each action, cut where one component ends and the next begins. The table has the numbers." }, hatching());
   for (const value of high - low > 1e-9 ? ticks(low, high, width > 420 ? 5 : 3) : [0]) {
     canvas.append(svg("line", { class: value === 0 ? "zero" : "grid-line", x1: x(value), x2: x(value), y1: 0, y2: top + 4 * step }));
-    canvas.append(svg("text", { x: x(value), y: height - 4, "text-anchor": "middle" }, said(value)));
+    canvas.append(svg("text", { x: x(value), y: height - 4, "text-anchor": "middle" }, shown(value)));
   }
   vectors.forEach((row, a) => {
     const y = top + a * step, kind = kindOf(a, choice), at = [0, 0];
@@ -158,10 +161,10 @@ export function drawBars(box, { vectors, choice, axis, news }) {
       if (!value) return;
       const side = value > 0 ? 1 : 0, from = at[side];
       at[side] += value;
-      const [begin, end] = [x(from), x(at[side])].sort((p, q) => p - q), title = `${ACTIONS[a]}, ${labelOf(i, horizon, axis.width)}: ${said(value, 4)}`;
+      const [begin, end] = [x(from), x(at[side])].sort((p, q) => p - q), title = `${ACTIONS[a]}, ${labelOf(i, horizon, axis.width)}: ${shown(value, 4)}`;
       canvas.append(...segment(i, horizon, { x: begin, y: y + 4, width: end - begin, height: step - 10, kind, title, fresh: news?.has(`${a},${i}`) }));
     });
-    canvas.append(svg("text", { class: kind === "a-none" ? "" : "strong", x: x(at[1]) + 6, y: y + 21 }, said(sum(row))));
+    canvas.append(svg("text", { class: kind === "a-none" ? "" : "strong", x: x(at[1]) + 6, y: y + 21 }, told[a]));
   });
   box.replaceChildren(canvas);
 }
@@ -178,8 +181,9 @@ export function drawContrast(box, { row, axis, names }) {
   row.forEach((value, i) => {
     const thick = each * 0.72, at = x(i) + (each - thick) / 2, [from, to] = [y(Math.max(0, value)), y(Math.min(0, value))];
     const label = labelOf(i, horizon, axis.width), middle = at + thick / 2;
-    if (value) canvas.append(...segment(i, horizon, { x: at, y: from, width: thick, height: to - from, kind: value > 0 ? "a-one" : "a-other", title: `${label}: ${said(value, 4)}` }));
-    if (each > 34) canvas.append(svg("text", { class: "strong", x: middle, y: value < 0 ? to + 13 : from - 4, "text-anchor": "middle" }, said(value, each > 48 ? 3 : 2)));
+    if (value) canvas.append(...segment(i, horizon, { x: at, y: from, width: thick, height: to - from, kind: value > 0 ? "a-one" : "a-other", title: `${label}: ${shown(value, 4)}` }));
+    const told = shown(value, each > 48 ? 3 : 2);
+    if (7.5 * told.length < each) canvas.append(svg("text", { class: "strong", x: middle, y: value < 0 ? to + 13 : from - 4, "text-anchor": "middle" }, told));
     const isShown = i === horizon || (i % every === 0 && x(horizon) - x(i) > 44);
     if (isShown) canvas.append(svg("text", { x: Math.min(middle, width - 4 * label.length), y: 162, "text-anchor": "middle" }, each > 62 || axis.width === 1 ? label : label.split("…")[0]));
   });
@@ -195,16 +199,14 @@ export function drawLegend(box, { axis: { horizon, width } }) {
 // ---- the table -----------------------------------------------------------------------------------
 
 /** Fills the table: a row for each action, and one for what the chosen two differ by. */
-export function drawTable(table, { vectors, contrast, totals, choice, axis, caption }) {
-  const { horizon, width } = axis, shown = (value) => (Number.isNaN(value) ? "none" : said(value, 4).replace("-", "−"));
-  const cells = (values) => values.map((value) => el("td", {}, shown(value)));
+export function drawTable(table, { vectors, contrast, totals, choice, axis }) {
+  const { horizon, width } = axis, cells = (values) => values.map((value) => el("td", {}, shown(value, 4)));
   const heads = ["action", ...vectors[0].map((_, i) => labelOf(i, horizon, width)), "Q", ...(totals ? ["total"] : [])];
-  table.caption.textContent = caption;
   table.tHead.replaceChildren(el("tr", {}, ...heads.map((text) => el("th", { scope: "col" }, text))));
   const rows = vectors.map((row, a) => el("tr", { className: kindOf(a, choice).slice(2) }, el("th", { scope: "row" }, ACTIONS[a]), ...cells([...row, sum(row), ...(totals ? [totals[a]] : [])])));
   if (contrast) {
     const { action, foil } = choice, apart = totals ? [totals[action] - totals[foil]] : [];
-    rows.push(el("tr", {}, el("th", { scope: "row" }, `${ACTIONS[action]} − ${ACTIONS[foil]}`), ...cells([...contrast, sum(contrast), ...apart])));
+    rows.push(el("tr", { className: "contrast" }, el("th", { scope: "row" }, `${ACTIONS[action]} − ${ACTIONS[foil]}`), ...cells([...contrast, sum(contrast), ...apart])));
   }
   table.tBodies[0].replaceChildren(...rows);
 }

@@ -1,7 +1,7 @@
 // The page: what is chosen, what follows from it, and how a reader changes it.
 // MAPS, ICONS, LAYOUT and STYLE are put in front by trdlab/playground/__init__.py.
 
-import { ACTIONS, buildWorld, changed, findState, mapText, parseMap, treasureOf } from "./world.js";
+import { ACTIONS, buildWorld, changed, findState, mapText, parseMap, statesLike, treasureOf } from "./world.js";
 import { isSame, solved, sum } from "./solver.js";
 import { choose, delta, flipSentences, headline, momentOf, neverFlips, sweepWords } from "./words.js";
 import { drawBars, drawContrast, drawLegend, drawMap, drawTable, el, symbols, toolButtons } from "./pictures.js";
@@ -44,16 +44,19 @@ class Playground extends HTMLElement {
     try {
       const drawn = parseMap(text);
       this.drawn = drawn;
-      this.grid = changed(drawn, { slip: now.slip, treasure: treasureOf(drawn) === null ? null : now.treasure });
-      this.solved = solved(buildWorld(this.grid), now);
+      if (treasureOf(drawn) === null) now.treasure = null; // there is none, or they differ
+      this.grid = changed(drawn, now);
+      const key = JSON.stringify({ ...now, map: text, state: 0, action: 0, foil: 0 });
+      if (key !== this.key) this.solved = solved(buildWorld(this.grid), now);
+      this.key = key;
       this.fault("");
     } catch (error) {
       if (!("cure" in error)) throw error;
-      if (!this.solved) Object.assign(this.now, { text: null }); // there is nothing else to show
-      if (!this.solved) this.update();
+      if (!this.solved) this.change({ text: null }); // there is nothing else to show
       this.fault(error.message);
     }
     this.draw();
+    this.at("flip").classList.add("unknown");
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.later(), PAUSE);
   }
@@ -61,10 +64,10 @@ class Playground extends HTMLElement {
   /** Does what takes longer, once nothing changes for a moment: the flips, and the address. */
   later() {
     if (this.isChanged) history.replaceState(null, "", this.link());
-    const { world } = this.solved ?? {}, isShown = world && !this.isFaulty && this.now.sweeps === null && this.choice?.foil >= 0;
-    if (!isShown) return this.showFlips(null);
+    const { solved: { world }, state, choice, moment } = this;
+    if (!choice) return; // nobody sees the page yet
+    if (this.isFaulty || this.now.sweeps !== null || choice.foil < 0) return this.showFlips(null);
     if (world.states.length > MOST_FLIP_STATES) return this.showFlips(null, "With so many states, other discounts are not tried here.");
-    const { state, choice, moment } = this;
     this.showFlips(isSame(moment.q[choice.action], moment.q[choice.foil]) ? null : flipsOfGamma(world, this.now.gamma, state, choice.action, choice.foil));
   }
 
@@ -106,13 +109,7 @@ class Playground extends HTMLElement {
 
   /** Draws the map, with what is worth what: as solved, or as far as sweeps have come. */
   drawGrid(drone) {
-    const { solved: { world, solution, table, before } } = this, stateAt = new Map(), width = this.grid.rows[0].length;
-    if (drone) {
-      world.states.forEach(({ row, column, collected }, s) => {
-        const place = row * width + column, isLike = collected.join() === drone.collected.join();
-        if (isLike || !stateAt.has(place)) stateAt.set(place, s);
-      });
-    }
+    const { solved: { world, solution, table, before } } = this, stateAt = drone ? statesLike(world, drone) : new Map();
     const best = (of) => world.states.map((_, s) => [0, 1, 2, 3].map((a) => sum(of.map((part) => part[4 * s + a]))));
     const shown = table ? best(table) : null, last = table ? best(before) : null;
     const values = shown ? shown.map((q) => Math.max(...q)) : solution.values;
@@ -145,7 +142,7 @@ class Playground extends HTMLElement {
     const { moment, choice, now, solved } = this, [first, ...more] = solved.table ? sweepWords(moment, choice, solved, now.sweeps) : headline(moment, choice);
     if (this.at("says").textContent !== first) this.at("says").textContent = first;
     this.at("more").replaceChildren(...more.map((text) => el("li", {}, text)));
-    const framed = now.sweeps ? " Framed in yellow: what the last one changed." : "";
+    const framed = now.sweeps ? " Framed in violet: what the last one changed." : "";
     this.at("status").textContent = now.sweeps === null ? `Solved exactly: ${counted(solved.world.states.length, "state")}.` : `After ${counted(now.sweeps, "sweep")} from nothing.${framed}`;
     this.at("forget").disabled = now.sweeps === 0;
     this.at("solve").disabled = now.sweeps === null;
@@ -170,8 +167,8 @@ class Playground extends HTMLElement {
       at("contrast-title").textContent = `${names.join(" minus ")}: above the line is what speaks for ${names[0]}, below it what speaks for ${names[1]}`;
       drawContrast(at("contrast"), { row: contrast, axis, names });
     }
-    const caption = `Expected discounted reward at row ${row}, column ${column}${before ? ", as swept so far" : ""}`;
-    drawTable(at("table"), { vectors, contrast, totals: before ? null : moment.totals, choice, axis, caption });
+    at("caption").textContent = `Expected discounted reward at row ${row}, column ${column}${before ? ", as swept so far" : ""}`;
+    drawTable(at("table"), { vectors, contrast, totals: before ? null : moment.totals, choice, axis });
   }
 
   /** Shows where the choice flips: none where that was not looked for, `[]` where it never does. */
@@ -179,6 +176,7 @@ class Playground extends HTMLElement {
     const { at, now: { gamma }, moment, choice } = this, flips = roots ?? [];
     const told = flipSentences(moment, choice, flips).join(" ") || (roots ? neverFlips(moment, choice) : instead);
     const where = flips.length ? ["The choice flips at γ = ", el("b", { id: "flip-at" }, flips.map((root) => root.toPrecision(5)).join(", ")), ". "] : [];
+    at("flip").classList.remove("unknown");
     at("flip-words").replaceChildren(...where, told);
     at("flip-try").hidden = !flips.length;
     this.nearest = flips.toSorted((a, b) => Math.abs(a - gamma) - Math.abs(b - gamma))[0];
@@ -275,8 +273,10 @@ class Playground extends HTMLElement {
     this.shadowRoot.addEventListener("keydown", (event) => event.stopPropagation()); // pages around it have keys of their own
     window.addEventListener("hashchange", () => {
       const chosen = fromHash(location.hash, MAPS);
-      if (chosen) this.now = chosen;
-      if (chosen) this.update();
+      if (!chosen) return; // a heading of the page around it
+      this.now = chosen;
+      this.update();
+      this.scrollIntoView();
     });
   }
 

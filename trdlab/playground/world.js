@@ -238,3 +238,13 @@ export function findState({ states }, text) {
   ));
   return found.length ? found.sort((a, b) => a[0] - b[0] || a[1] - b[1])[0][1] : -1;
 }
+
+/** Returns for each place the state that is shown there: with the same collected as in another one, or else the first. */
+export function statesLike({ grid, states }, { collected }) {
+  const found = new Map(), width = grid.rows[0].length;
+  states.forEach((state, s) => {
+    const place = state.row * width + state.column;
+    if (!found.has(place) || state.collected.join() === collected.join()) found.set(place, s);
+  });
+  return found;
+}

@@ -260,6 +260,16 @@ def test_seventh_lesson_says_what_its_numbers_show() -> None:
     assert len(set(stumbling)) > 5
 
 
+def test_eighth_lesson_learns_the_policy_and_then_what_comes_of_it() -> None:
+    printed = printed_by(LESSONS[7])
+    teacher, student = re.findall(r"^The (?:teacher|student): (-\d+) ", printed, re.MULTILINE)
+    assert abs(int(teacher) - int(student)) < 20
+    row = r"^ +{} +(\d\.\d\d) +(\d\.\d\d) +t\+9$"
+    [joint] = re.findall(row.format("with the policy"), printed, re.MULTILINE)
+    [fitted] = re.findall(row.format("afterwards"), printed, re.MULTILINE)
+    assert all(float(late) > float(early) for late, early in zip(fitted, joint, strict=True))
+
+
 def test_ninth_lesson_says_what_its_numbers_show() -> None:
     printed = printed_by(LESSONS[8])
 

@@ -8,7 +8,7 @@
 #
 # - **Goal:** let an agent learn from a teacher, and find out whether its forecasts can be trusted.
 # - **Before it:** [lesson 7](07_explain_your_own.md).
-# - **Time:** a quarter of an hour to read; one to two minutes to run, on two cores.
+# - **Time:** a quarter of an hour to read; about a minute to run, on two cores.
 
 # %%
 from pathlib import Path
@@ -92,7 +92,9 @@ print(student.estimator.future.policy)
 
 # %%
 joint = trdlab.calibrate(student, episodes=20)
-fitted = trdlab.fit(student, horizon=10, steps=10_000, layers="copied")
+fitted = trdlab.fit(
+    student, horizon=10, steps=10_000, layers="copied", most_updates=3_000
+)
 afterwards = trdlab.calibrate(fitted, episodes=20)
 
 print("                skill at t+5    t+9   trusted to")

@@ -10,7 +10,7 @@
 #
 # - **Goal:** make a map of what a forecast hangs on, test it, and know when not to show it.
 # - **Before it:** [lesson 1](01_read_a_reward_vector.md); [lesson 7](07_explain_your_own.md) helps.
-# - **Time:** half an hour to read; about a minute to run, on two cores.
+# - **Time:** half an hour to read; half a minute to run, on two cores.
 
 # %%
 import gymnasium as gym

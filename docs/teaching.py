@@ -96,8 +96,7 @@ Each was drawn by the command beside it:
 
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
     """Adds the figures, one by one and packed, and a place for the deck."""
-    cache = Path(config.config_file_path).parent / ".cache" / "docs"
-    for name, content in figures(cache).items():
+    for name, content in figures(_cache(config)).items():
         files.append(structure.File.generated(config, f"teach/{name}", content=content))
     files.append(structure.File.generated(config, DECK, content=b""))
     return files
@@ -106,10 +105,14 @@ def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
 def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
     """Writes the deck when its slides have become HTML."""
     if page.file.src_uri == SLIDES:
-        cache = Path(config.config_file_path).parent / ".cache" / "docs"
-        text = deck(str(page.title), str(page.content), figures(cache))
+        heading = next(iter(page.toc)).title
+        text = deck(heading, str(page.content), figures(_cache(config)))
         Path(config.site_dir, DECK).write_text(text, encoding="utf-8")
     return output
+
+
+def _cache(config: MkDocsConfig) -> Path:
+    return Path(config.config_file_path).parent / ".cache" / "docs"
 
 
 # ---- figures -------------------------------------------------------------------------------------

@@ -19,11 +19,12 @@ import yaml
 from mkdocs.exceptions import PluginError
 
 import trdlab
+from browser import Visit, chromium
 from trdlab.teach.checking import EXERCISES
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-WHY = sorted((DOCS / "why").glob("*.md"))
+WHY = [DOCS / "why" / f"{name}.md" for name in ("theorem", "saliency", "calibration")]
 TEACH = sorted((DOCS / "teach").glob("*.md"))
 
 
@@ -143,8 +144,36 @@ def test_the_parts_of_a_page_become_slides_that_stand_alone() -> None:
     assert not re.search(r'(?:src|href)="(?!data:)', page)  # nothing is loaded
 
 
+def test_a_deck_is_shown_by_keyboard_and_printed_whole(tmp_path: Path) -> None:
+    file = tmp_path / "deck.html"
+    content = "<h1>One</h1><blockquote>Say this.</blockquote><hr><h2>Two</h2><hr><h2>Three</h2>"
+    file.write_text(teaching.deck("Deck", content, {}), encoding="utf-8")
+    with chromium() as browser:
+        visit = Visit(browser, file)
+
+        def seen() -> list[str]:
+            return [of for of in ("One", "Two", "Three") if visit.page.is_visible(f"text={of}")]
+
+        assert seen() == ["One"]
+        assert not visit.page.is_visible("text=Say this.")
+        visit.page.keyboard.press("n")
+        assert visit.page.is_visible("text=Say this.")
+        for key, shown, where in (
+            ("ArrowRight", ["Two"], "2 / 3"),
+            ("End", ["Three"], "3 / 3"),
+            ("ArrowRight", ["Three"], "3 / 3"),  # there is no slide after it
+            ("ArrowLeft", ["Two"], "2 / 3"),
+        ):
+            visit.page.keyboard.press(key)
+            assert (seen(), visit.text("#where")) == (shown, where)
+        assert visit.page.url.endswith("#2")
+        visit.page.emulate_media(media="print")
+        assert seen() == ["One", "Two", "Three"]
+        assert not visit.faults
+
+
 def test_a_picture_that_would_have_to_be_loaded_is_refused() -> None:
-    with pytest.raises(PluginError, match=r"slide .* figures/none\.svg"):
+    with pytest.raises(PluginError, match=r"slide shows figures/none\.svg"):
         teaching.deck("A", '<img src="figures/none.svg">', PICTURES)
 
 

@@ -66,7 +66,9 @@ for rounds in (1, 2, 5, 10, 20):
 
 # %% [markdown]
 # The column on the right is 0 for ever. Yet the outcome is 1 with certainty. *The expectation of
-# the sum is 1, the sum of the expectations is 0*: a vector of components would not add up to Q.
+# the sum is 1, the sum of the expectations is 0*. However many components you take, all of them are
+# 0, and the 1 is in what is left. No component would ever tell of it
+# ([more](../why/theorem.md#1-the-components-add-up-to-q)).
 #
 # So both conditions matter. Where states are finitely many, rewards are bounded of themselves. The
 # other condition trdlab insists on:

@@ -40,12 +40,12 @@ UP, DOWN, LEFT, RIGHT = range(4)
 # Learning an estimate from a later estimate is called *temporal-difference learning*, TD. With
 # N = 0 this is Q-learning. With N > 0 it is the same, in every component at once.
 #
-# > **The formula.** After a step from $s$ with action $a$ to $s'$, where $a'$ is the action with
-# > the largest sum (after a termination, with 0 for $\gamma$):
+# > **The formula.** After a step from $s$ with action $a$, where $n$ is what the table says of the
+# > best next action (after a termination, $n = 0$):
 # >
 # > $$c(s,a)\leftarrow c(s,a)+\alpha\,\big(y-c(s,a)\big)$$
 # >
-# > $$y=\big(r,\;\gamma c_0(s',a'),\;\dots,\;\gamma c_{N-1}(s',a')+\gamma c_N(s',a')\big)$$
+# > $$y=\big(r,\;\gamma n_0,\;\dots,\;\gamma(n_{N-1}+n_N)\big)$$
 
 
 # %%

@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Lesson 4: why the loss on the sum fails, and what wide windows change
+# # Lesson 4: why the sum fails
 #
 # In [lesson 3](03_learn_it.md) a table learned each component from its own target. Two questions
 # were left. An agent needs only the sum to act: could it not learn the sum, and let the components

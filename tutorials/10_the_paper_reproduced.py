@@ -1134,10 +1134,10 @@ for game, card in CARDS.items():
     )
 
 # %% [markdown]
-# The first four numbers of a row are of a fit that was made for a policy that stands still. The
-# last four are of components that were learned as the paper learns them, together with the
-# policy: near steps are told, and far ones mostly not. The paper did not measure this. A good
-# score, and plausible peaks, do not show it.
+# The first four numbers of a row are of a fit, made for a policy that stands still. The last four
+# are of components that were learned together with the policy, as the paper's are (for a policy
+# head, though, and not with a maximum). Of those, near steps are told, and far ones mostly not. The
+# paper did not measure this. A good score, and plausible peaks, do not show it.
 #
 # **What matters in an observation** (6.2). GradCAM was checked above. What is left is the paper's
 # difference: each map without what is below 0, divided by its largest, and one taken from the

@@ -574,11 +574,16 @@ law_apart = np.abs(
 print(f"by Eq. 15, no component of any state and action is off by {law_apart:.1g}")
 
 # %% [markdown]
-# > **The formula.** The next $w$ steps pay $r=\sum_{i=0}^{w-1}\gamma^i R_{t+i}$, and $n$ is the >
-# vector of the best action in $s_{t+w}$. In its right form, Eq. 15 has $N+1$ errors: > >
-# $$L=\mathbb{E}\big[e_0^2+e_1^2+\dots+e_N^2\big]$$ > > $$e_0=q_0-r,\qquad e_i=q_i-\gamma^w
-# n_{i-1},\qquad e_N=q_N-\gamma^w(n_{N-1}+n_N)$$ > > As printed there are $N+2$ of them, and
-# $\sum_{i=0}^{w}R_{t+i}$ stands in place of $r$.
+# > **The formula.** The next $w$ steps pay $r=\sum_{i=0}^{w-1}\gamma^i R_{t+i}$, and $n$ is the
+# > vector of the best action in $s_{t+w}$. In its right form, Eq. 15 has $N+1$ errors:
+# >
+# > $$L=\mathbb{E}\big[e_0^2+e_1^2+\dots+e_N^2\big]$$
+# >
+# > $$e_0=q_0-r,\qquad e_i=q_i-\gamma^w n_{i-1}$$
+# >
+# > $$e_N=q_N-\gamma^w(n_{N-1}+n_N)$$
+# >
+# > As printed there are $N+2$ of them, and $\sum_{i=0}^{w}R_{t+i}$ stands in place of $r$.
 
 # %% folded
 Table(
@@ -1129,10 +1134,10 @@ for game, card in CARDS.items():
     )
 
 # %% [markdown]
-# The first four numbers of a row are of a fit that was made for a policy that stands still. The
-# last four are of components that were learned as the paper learns them, together with the
-# policy: near steps are told, and far ones mostly not. The paper did not measure this. A good
-# score, and plausible peaks, do not show it.
+# The first four numbers of a row are of a fit, made for a policy that stands still. The last four
+# are of components that were learned together with the policy, as the paper's are (for a policy
+# head, though, and not with a maximum). Of those, near steps are told, and far ones mostly not. The
+# paper did not measure this. A good score, and plausible peaks, do not show it.
 #
 # **What matters in an observation** (6.2). GradCAM was checked above. What is left is the paper's
 # difference: each map without what is below 0, divided by its largest, and one taken from the
@@ -1702,9 +1707,9 @@ answer_3 = None  # replace with a number
 check("10.3", answer_3)
 
 # %% [markdown]
-# > **An open question.** Two things are known that make w > 1 worse: random actions inside the >
-# windows, and a buffer that bootstraps in the wrong state. Which experiment would tell how much >
-# of Figure 3 is which? On which worlds would you do it first, and with how many seeds?
+# > **An open question.** Two things are known that make w > 1 worse: random actions inside the
+# > windows, and a buffer that bootstraps in the wrong state. Which experiment would tell how much
+# > of Figure 3 is which? On which worlds would you do it first, and with how many seeds?
 
 # %% [markdown]
 # ## What you have learned

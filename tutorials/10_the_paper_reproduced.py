@@ -808,11 +808,10 @@ for name, theirs, ours in TABLE_1:
     print(f"{name:<24} {theirs:>12}  {ours}{mark}")
 
 # %% [markdown]
-# This command takes the table's numbers where the preset has others. It needs a GPU, or days:
+# Such a run needs a GPU, or days:
 #
 # ```console
-# $ trdlab train atari Breakout --preset paper --teacher FILE \
-#     --teacher-steps 1000000 --offline-updates 1000000 --agent-steps 4000000
+# $ trdlab train atari Breakout --preset paper --teacher FILE
 # ```
 #
 # ### The sweeps, where the answer is known
@@ -1568,11 +1567,9 @@ Table(
         "Table 1",
         f"{len(TABLE_1)} settings.",
         "partly",
-        "the table of Section 5 above; `trdlab train atari Breakout --preset paper --dry-run`",
+        "the table of Section 5 above",
         f"{same} of {len(TABLE_1)} are the same in `--preset paper`.",
-        "Ten million steps in place of four, a shorter offline phase, other evaluations. The "
-        "command "
-        "there takes the table's steps. 1000 steps are 250 updates ([C6](../errata.md#c6)).",
+        "Other evaluations. 1000 steps are 250 updates ([C6](../errata.md#c6)).",
     ),
     Row(
         "app:rewards",

@@ -131,7 +131,7 @@ def _least_lead(moment: Moment, action: str, foil: str) -> FloatArray:
     size = np.abs(moment.lead(action, foil))  # [N+1]
     if not moment.is_exact:
         noise = NOISE * float(size[:-1].max(initial=0.0))
-        return np.maximum(noise, SLIGHT * off_together(moment, action, foil))
+        return np.asarray(np.maximum(noise, SLIGHT * off_together(moment, action, foil)))
     steps = [least(moment, name).max(initial=0.0) for name in (action, foil)]
     return np.full(len(size), max(NEGLIGIBLE * float(size.max()), *steps))
 

@@ -82,13 +82,15 @@ for name, of in {"draws": agent, "takes the likeliest": steady}.items():
 # later. The agent itself stays as it is.
 #
 # A reward is not all that can be forecast. Name whatever happens in a step, and it is learned, too.
-# Here it is a game that is lost, which we call a fall. This cell takes most of the time.
+# Here it is a game that is lost, which we call a fall. This cell takes most of the time. Without
+# `most_updates` it would learn until it gains no more.
 
 # %%
 fitted = trdlab.fit(
     agent,
     horizon=30,
     steps=40_000,
+    most_updates=5_000,
     outcomes={"fall": lambda step: step.terminated},
 )
 print(fitted.estimator.time_axis)

@@ -36,26 +36,24 @@ LITTLE = (
 CHEAP = {
     r"^trdlab train gym (?!.*--teacher)": f"{LITTLE} --evaluate-episodes 5",
     r"^trdlab train .*--teacher": f"{LITTLE} --teacher-steps 100 --offline-updates 50",
-    r"^trdlab train atari ": f"{LITTLE} --evaluate-episodes 1 --from-scratch --no-fit",
     r"^trdlab resume .*--agent-steps": "--agent-steps 60",
     r"^trdlab evaluate ": "--episodes 2 --max-steps 40",
     r"^trdlab agent ": "--episodes 2 --max-steps 40",
-    r"^trdlab (explain|report) (?!gridworld|tabular)": "--episodes 0 --max-steps 40",
+    r"^trdlab (explain|report) (?!gridworld|tabular)": "--episodes 0 --max-steps 5",
     r"^trdlab explain fits": "--what forecast",
     r"^trdlab report ": "--others 1",
     r"^trdlab video ": "--max-steps 5",
+    r" --step \d": "--step 2",
 }
 """What makes a command that takes long a cheap one; of some options the last one counts."""
 ONLY_PARSED = {
-    r"atari \w+ .*--teacher|atari \w+ --env-arg": "measures a teacher, or plays, for a minute",
+    r"^trdlab train atari ": "plays games for minutes; tests/training has it",
     r"^trdlab fit ": "is run once, for all pages (`made`)",
     r"--kind goals": "tests/study has it",
     r"acktr|young|runs/received|@\d+|LunarLander": "a file that everybody has another one of",
     r"\.\.\.|[A-Z]{3,}|\bDIR\b|FILE": "stands for another word",
     r"study score": "tests/study has it",
-    r"--step (1[0-9]{2}|[2-9][0-9]{2})": "plays a game to that step",
     r"--weights": "of a checkpoint that takes minutes to reach",
-    r"train atari Breakout$": "needs the teacher that comes with it",
     r"--preset gpu|--device cuda$": "needs a card",
 }
 """Commands of which only the options are checked, and why."""

@@ -39,15 +39,15 @@ CHEAP = {
     r"^trdlab resume .*--agent-steps": "--agent-steps 60",
     r"^trdlab evaluate ": "--episodes 2 --max-steps 40",
     r"^trdlab agent ": "--episodes 2 --max-steps 40",
-    r"^trdlab (explain|report) (?!gridworld|tabular)": "--episodes 0 --max-steps 5",
+    r"^trdlab explain (?!gridworld|tabular)": "--episodes 0 --max-steps 5",
     r"^trdlab explain fits": "--what forecast",
-    r"^trdlab report ": "--others 1",
     r"^trdlab video ": "--max-steps 5",
     r" --step \d": "--step 2",
 }
 """What makes a command that takes long a cheap one; of some options the last one counts."""
 ONLY_PARSED = {
     r"^trdlab train atari ": "plays games for minutes; tests/training has it",
+    r"^trdlab report pretrained": "takes a quarter of a minute; tests/cli has short ones",
     r"^trdlab fit ": "is run once, for all pages (`made`)",
     r"--kind goals": "tests/study has it",
     r"acktr|young|runs/received|@\d+|LunarLander": "a file that everybody has another one of",

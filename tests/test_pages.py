@@ -34,25 +34,24 @@ LITTLE = (
 CHEAP = {
     r"^trdlab train gym (?!.*--teacher)": f"{LITTLE} --evaluate-episodes 5",
     r"^trdlab train .*--teacher": f"{LITTLE} --teacher-steps 100 --offline-updates 50",
-    r"^trdlab train atari ": f"{LITTLE} --evaluate-episodes 1 --from-scratch --no-fit",
     r"^trdlab resume .*--agent-steps": "--agent-steps 60",
-    r"^trdlab fit ": "--steps 300 --time 1s",
     r"^trdlab evaluate ": "--episodes 2 --max-steps 40",
     r"^trdlab agent ": "--episodes 2 --max-steps 40",
-    r"^trdlab (explain|report|compare) (?!gridworld|tabular)": "--episodes 1 --max-steps 40",
-    r"^trdlab report ": "--others 1 --episodes 1",
+    r"^trdlab explain (?!gridworld|tabular)": "--episodes 0 --max-steps 5",
+    r"^trdlab explain fits": "--what forecast",
     r"^trdlab video ": "--max-steps 5",
+    r" --step \d": "--step 2",
 }
 """What makes a command that takes long a cheap one; of some options the last one counts."""
 ONLY_PARSED = {
-    r"atari \w+ .*--teacher|atari \w+ --env-arg": "measures a teacher, or plays, for a minute",
+    r"^trdlab train atari ": "plays games for minutes; tests/training has it",
+    r"^trdlab report pretrained": "takes a quarter of a minute; tests/cli has short ones",
+    r"^trdlab fit ": "is run once, for all pages (`made`)",
     r"--kind goals": "tests/study has it",
     r"acktr|young|runs/received|@\d+|LunarLander": "a file that everybody has another one of",
     r"\.\.\.|[A-Z]{3,}|\bDIR\b|FILE": "stands for another word",
     r"study score": "tests/study has it",
-    r"--step (1[0-9]{2}|[2-9][0-9]{2})": "plays a game to that step",
     r"--weights": "of a checkpoint that takes minutes to reach",
-    r"train atari Breakout$": "needs the teacher that comes with it",
     r"--preset gpu|--device cuda$": "needs a card",
 }
 """Commands of which only the options are checked, and why."""
@@ -82,8 +81,8 @@ def test_every_other_command_names_what_there_is() -> None:
             words = shlex.split(command)
             if words[0] == "make":
                 assert words[1] in targets, command
-            for path in re.findall(r"(?:benchmarks|docs|tutorials)/\w+\.py|\w+\.txt", command):
-                assert (ROOT / path).exists() or path.startswith("garden"), command
+            for path in re.findall(r"((?<= -[rc] )\w+\.txt|\w+/\w+\.py)", command):
+                assert (ROOT / path).exists(), command
             for extras in re.findall(r"(?:trdlab|\.)\[([\w,]+)\]", command):
                 assert set(extras.split(",")) <= set(project["optional-dependencies"]), command
 
@@ -109,10 +108,10 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             held = {path.name for path in run.folder.path.iterdir()}
     assert {".lock", ".holder.json"} <= held
     cartpole_ppo(folder / "ppo.zip")
-    fit = f"fit {folder}/ppo.zip --env CartPole-v1 --steps 300 --time 1s --out {folder}/fits/{FIT}"
+    fit = f"fit {folder}/ppo.zip --env CartPole-v1 --N 3 --steps 300 --time 1s"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("NO_COLOR", "1")
-        run_command(f"trdlab {fit}", fails=False)
+        run_command(f"trdlab {fit} --out {folder}/fits/{FIT}", fails=False)
     shutil.copy(ROOT / "docs" / "assets" / "garden.txt", folder)
     return folder
 
@@ -181,6 +180,7 @@ def test_the_commands_of_a_page_run_and_print_what_it_shows(
 
 CODE = {
     "trdlab.fit(agent": "trdlab.fit(agent, steps=300, most_updates=5",
+    "horizon=40": "horizon=3",
     "trdlab.calibrate(agent": "trdlab.calibrate(agent, episodes=2",
     "seed=3, step=5)": "seed=3, step=5, episodes=2)",
     "range(200)": "range(5)",

@@ -100,18 +100,20 @@ def words_of(command: str) -> list[str]:
 
 
 def matches(shown: Shown, printed: str) -> bool:
-    """Returns whether this was printed; `…` stands for what is left out."""
+    """Returns whether this was printed; `…` stands for what is left out, in a line or of lines."""
     lines = [line.rstrip() for line in printed.splitlines()]
-    told = [line.rstrip() for line in shown.output.splitlines()]
     if shown.kind == "recorded":
         return True
     if shown.kind == "measured":
-        bare = "\n".join(map(_bare, lines))
-        return all(f"\n{_bare(line)}" in f"\n{bare}" for line in told if line != "…")
-    pattern = "\n".join(
-        r"(?:.*\n)*?.*" if line == "…" else re.escape(line).replace("…", ".*") for line in told
-    )
-    return re.search(pattern, "\n".join(lines)) is not None
+        told = [line for line in shown.output.splitlines() if line != "…"]
+        bare = [line for line in map(_bare, lines) if line]
+        return all(
+            any(_bare(of).startswith(line) or line.startswith(_bare(of)) for line in bare)
+            for of in told
+        )
+    parts = re.split(r"^…$", shown.output, flags=re.MULTILINE)
+    patterns = (re.escape(part.strip("\n")).replace("…", ".*") for part in parts)
+    return all(re.search(pattern, "\n".join(lines)) for pattern in patterns)
 
 
 def _bare(line: str) -> str:

@@ -40,9 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             cure = f"If you trust it, add: --import {error.module}"
         _fail(as_options(f"{error.cause} {cure}".strip()), error.exit_code)
     except ModuleNotFoundError as error:
-        if error.name not in _HEAVY or {"-v", "--verbose"} & set(words):
+        package = _HEAVY.get(error.name or "")
+        if package is None or {"-v", "--verbose"} & set(words):
             raise
-        cause = f"This needs {_HEAVY[error.name]}, which a light installation leaves out."
+        cause = f"This needs {package}, which a light installation leaves out."
         _fail(f"{cause} Run: pip install trdlab", 1)
     except usage_error as error:
         if not error.format_message():  # no command was given, and the help has been printed

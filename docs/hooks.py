@@ -1,6 +1,6 @@
 """What MkDocs does beside turning Markdown into pages: lessons, commands, and the reference.
 
-The lessons of `tutorials/` are run, each in a process of its own, and become pages; the commands
+The lessons of `tutorials/` are run, each in a kernel of its own, and become pages; the commands
 on the pages are run, and the lists of the reference filled in. Neither a lesson nor a command is
 run again before its sources change: the results are kept in `.cache/docs/`. There, in `pages/`,
 lies also what comes of it all: plain Markdown, from which another program can build the site.
@@ -11,25 +11,25 @@ import json
 import logging
 import os
 import re
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from shutil import rmtree
-from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
 from catalogue import expanded
 from executed import BlockError, Run, executed, outputs
 from kept import Files, fingerprint, made
+from lesson import LessonError, lesson_page, lesson_run
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.livereload import LiveReloadServer
 from mkdocs.structure import files as structure
 from mkdocs.structure.pages import Page
+from notebooks import lessons
 
 DOCS = Path(__file__).parent
 _FROM_THE_NETWORK = re.compile(
@@ -63,15 +63,14 @@ def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
 
 
 def add_lessons(files: structure.Files, config: MkDocsConfig) -> None:
-    """Adds a page for each lesson, its pictures, and the scripts themselves to download."""
-    scripts = sorted(_tutorials(config).glob("*.py"))
-    lessons = [script for script in scripts if script.name[0].isdigit()]
-    for script in scripts:
-        uri = f"lessons/{script.name}"
-        files.append(structure.File.generated(config, uri, abs_src_path=str(script)))
+    """Adds a page for each lesson, its pictures, and script and notebook to download."""
+    scripts = lessons(_tutorials(config))
+    for file in [*scripts, *(_tutorials(config) / "notebooks").glob("*.ipynb")]:
+        uri = f"lessons/{file.name}"
+        files.append(structure.File.generated(config, uri, abs_src_path=str(file)))
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # the first that fails ends it
-        pages = list(pool.map(lambda script: lesson(script, _cache(config)), lessons))
-    for script, made_of_it in zip(lessons, pages, strict=True):
+        pages = list(pool.map(lambda script: lesson(script, _cache(config)), scripts))
+    for script, made_of_it in zip(scripts, pages, strict=True):
         for name, content in made_of_it.items():
             uri = f"lessons/{script.stem}.md" if name == "page.md" else f"lessons/{name}"
             files.append(structure.File.generated(config, uri, content=content))
@@ -126,34 +125,10 @@ def lesson(script: Path, cache: Path) -> Files:
     Raises:
         PluginError: a cell of it raises; the message names the script and the line.
     """
-
-    def hashed() -> str:
-        return fingerprint(
-            script, script.parent / "exercise.py", DOCS / "lesson.py", str(_PLAIN), _package()
-        )
-
-    def make() -> Files:
-        _log.info("Lesson %s: running", script.stem)
-        begun = perf_counter()
-        files = run_lesson(script)
-        _log.info("Lesson %s: done in %.0f s", script.stem, perf_counter() - begun)
-        return files
-
-    return made(cache, script.stem, hashed, make)
-
-
-def run_lesson(script: Path) -> Files:
-    """Runs a lesson in a process of its own and returns its page and its pictures."""
-    with TemporaryDirectory() as folder:
-        command = [sys.executable, "-P", str(DOCS / "lesson.py"), str(script), folder]
-        threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # lessons share the cores
-        done = subprocess.run(
-            command, env=os.environ | threads, capture_output=True, text=True, check=False
-        )
-        if done.returncode:
-            said = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-            raise PluginError(said if script.name in said else f"{script.name}: {said}")
-        return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
+    try:
+        return lesson_page(script, lesson_run(script, cache))
+    except LessonError as error:
+        raise PluginError(str(error)) from error
 
 
 def kept_outputs(run: Run, cache: Path) -> list[str]:

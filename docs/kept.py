@@ -8,11 +8,14 @@ import sys
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import distributions
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+
+from filelock import FileLock
 
 Files = dict[str, bytes]
 """The content of some files by their names."""
@@ -72,12 +75,24 @@ def keep(path: Path, files: Mapping[str, bytes]) -> None:
 def made(folder: Path, thing: str, hashed: Callable[[], str], make: Callable[[], Files]) -> Files:
     """Returns what is kept of a thing, or makes it and keeps it.
 
-    What changes while it is made is not kept: nobody knows from which version it was made.
+    Who asks while another makes it waits, and gets the same. What changes while it is made is not
+    kept: nobody knows from which version it was made.
     """
     before = hashed()
     path = folder / f"{thing}-{before[:16]}.zip"
     if (files := kept(path)) is None:
-        files = make()
-        if hashed() == before:
-            keep(path, files)
+        with _alone(folder / f"{thing}.lock"):
+            if (files := kept(path)) is None:
+                files = make()
+                if hashed() == before:
+                    keep(path, files)
     return files
+
+
+def _alone(lock: Path) -> AbstractContextManager[object]:
+    try:
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        lock.touch()
+    except OSError:  # where nothing can be written, nothing is kept, and each makes its own
+        return nullcontext()
+    return FileLock(lock)

@@ -1,4 +1,4 @@
-"""The machinery of the documentation: lessons become pages, docstrings become Markdown."""
+"""The machinery of the documentation: what is kept, lists of the reference, docstrings."""
 
 import importlib.util
 import json
@@ -7,8 +7,10 @@ import re
 import shlex
 import subprocess
 import sys
+import threading
+import time
 from collections import Counter
-from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -35,130 +37,7 @@ with pytest.MonkeyPatch.context() as patch:
     patch.syspath_prepend(ROOT / "docs")  # as MkDocs does for a hook
     hooks, catalogue, kept = _load("hooks"), _load("catalogue"), _load("kept")
     blocks_of = _load("executed")
-    lesson_of, docstrings = _load("lesson"), _load("docstrings")
-
-Page = tuple[str, dict[str, bytes]]
-
-
-@pytest.fixture
-def lesson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Page]:
-    """Returns a function that makes the page of a script."""
-    monkeypatch.setenv("MPLBACKEND", "agg")
-    folder = tmp_path / "tutorials"
-    folder.mkdir()
-
-    def page(source: str) -> Any:
-        script = folder / "03_try.py"
-        script.write_text(source, encoding="utf-8")
-        return lesson_of.lesson_page(script)
-
-    return page
-
-
-def test_cells_are_prose_or_code_and_know_their_line() -> None:
-    source = "import os\n\n# %% [markdown]\n# # Title\n#\n# Text.\n\n# %% a name\n\nx = 1\n\n# %%\n"
-    assert list(lesson_of.split_cells(source)) == [
-        lesson_of.Cell("import os", 1, is_prose=False),
-        lesson_of.Cell("# Title\n\nText.", 4, is_prose=True),
-        lesson_of.Cell("x = 1", 10, is_prose=False),
-    ]
-
-
-def test_a_script_without_markers_is_one_cell() -> None:
-    assert list(lesson_of.split_cells("x = 1\n")) == [lesson_of.Cell("x = 1", 1, is_prose=False)]
-    assert list(lesson_of.split_cells("")) == []
-
-
-def test_prose_stays_prose_and_output_follows_its_code(lesson: Callable[[str], Page]) -> None:
-    page, pictures = lesson('# %% [markdown]\n# Hello.\n\n# %%\nprint("a  ")\nprint("b")\n')
-    assert page == (
-        'Hello.\n\n```python\nprint("a  ")\nprint("b")\n```\n\n```{.text .output}\na\nb\n```\n'
-    )
-    assert pictures == {}
-
-
-def test_cells_share_their_names(lesson: Callable[[str], Page]) -> None:
-    page, _ = lesson("# %%\nx = 20\n\n# %%\nx + 1\n")
-    assert page.endswith("```python\nx + 1\n```\n\n```{.text .output}\n21\n```\n")
-
-
-def test_a_cell_that_returns_nothing_shows_nothing(lesson: Callable[[str], Page]) -> None:
-    assert lesson("# %%\nx = [1]\n\n# %%\nx.sort()\n")[0].count("```") == 4
-
-
-def test_a_value_with_html_is_shown_as_html(lesson: Callable[[str], Page]) -> None:
-    page, _ = lesson(
-        "# %%\nfrom trdlab.decomposition import *\n\n"
-        "# %%\nRewardDecomposition([1, 2], TimeAxis(0.5, 1))\n"
-    )
-    assert '\n\n<div class="output"><table>' in page
-
-
-@pytest.mark.parametrize(
-    ("cell", "count"),
-    [
-        ("figure, ax = plt.subplots()\n", 1),
-        ("figure, ax = plt.subplots()\nfigure\n", 1),
-        ("plt.figure()\nplt.figure()\n", 2),
-        ("from matplotlib.figure import Figure\nFigure()\n", 1),
-        ("Figure = plt.Figure\n", 0),
-    ],
-)
-def test_figures_become_pictures(lesson: Callable[[str], Page], cell: str, count: int) -> None:
-    source = f"# %%\nfrom matplotlib import pyplot as plt\n\n# %%\n{cell}"
-    page, pictures = lesson(source)
-    assert list(pictures) == [f"03_try-{i + 1}.svg" for i in range(count)]
-    assert all(f"]({name})" in page for name in pictures)
-    assert all(picture.startswith(b"<?xml") for picture in pictures.values())
-    assert lesson(source) == (page, pictures)  # to the byte
-
-
-@pytest.mark.parametrize(
-    ("source", "message"),
-    [
-        ("# %%\nx = 1\n\n# %%\nx = 2\n1 / 0\n", "line 6: ZeroDivisionError: division by zero"),
-        ("# %% [markdown]\n# Hi.\n\n# %%\n\nmissing\n", "line 6: NameError: name 'missing'"),
-        ("# %%\ndef f():\n    raise ValueError('no')\n\n# %%\nf()\n", "line 3: ValueError: no"),
-        ("# %%\nx = 1\n\n# %%\nx = = 2\n", "line 5: SyntaxError"),
-        ("# %%\nint('a')\n", "line 2: ValueError"),
-    ],
-)
-def test_an_error_names_script_and_line(
-    lesson: Callable[[str], Page], source: str, message: str
-) -> None:
-    with pytest.raises(lesson_of.LessonError, match=re.escape(f"tutorials/03_try.py, {message}")):
-        lesson(source)
-
-
-def test_a_failing_lesson_leaves_the_path_as_it_was(lesson: Callable[[str], Page]) -> None:
-    before = list(sys.path)
-    with pytest.raises(lesson_of.LessonError):
-        lesson("# %%\n1 / 0\n")
-    assert sys.path == before
-
-
-@pytest.fixture
-def counting(tmp_path: Path) -> tuple[Path, Path]:
-    """Returns a lesson that leaves a mark each time it is run, and the file of the marks."""
-    marks, script = tmp_path / "marks", tmp_path / "tutorials" / "03_try.py"
-    script.parent.mkdir()
-    (script.parent / "exercise.py").write_text("")
-    script.write_text(f"# %%\nopen({str(marks)!r}, 'a').write('|')\nprint('hello')\n")
-    return script, marks
-
-
-def test_a_lesson_is_run_again_only_if_its_sources_have_changed(
-    counting: tuple[Path, Path], tmp_path: Path
-) -> None:
-    (script, marks), cache = counting, tmp_path / "cache"
-    page = hooks.lesson(script, cache)
-    assert b"hello" in page["page.md"]
-    assert hooks.lesson(script, cache) == page
-    assert marks.read_text() == "|"
-    (script.parent / "exercise.py").write_text("# another\n")
-    assert hooks.lesson(script, cache) == page
-    assert marks.read_text() == "||"
-    assert len(list(cache.iterdir())) == 1  # what is out of date is gone
+    docstrings = _load("docstrings")
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", None], ids=["empty", "no archive", "cut"])
@@ -171,7 +50,7 @@ def test_a_torn_result_is_made_again(tmp_path: Path, content: bytes | None) -> N
 
     for _ in range(2):
         assert kept.made(tmp_path, "a", lambda: "hash", make) == {"page.md": b"hello"}
-    [file] = tmp_path.iterdir()
+    [file] = tmp_path.glob("*.zip")
     file.write_bytes(file.read_bytes()[:-30] if content is None else content)
     for _ in range(2):
         assert kept.made(tmp_path, "a", lambda: "hash", make) == {"page.md": b"hello"}
@@ -197,20 +76,33 @@ def test_what_changes_while_it_is_made_is_not_kept(tmp_path: Path) -> None:
         return {"a": b""}
 
     kept.made(tmp_path / "cache", "a", lambda: kept.fingerprint(source), make)
-    assert not (tmp_path / "cache").exists()
+    assert list(tmp_path.glob("cache/*.zip")) == []
 
 
-def test_a_failing_lesson_says_where_and_is_not_kept(
-    counting: tuple[Path, Path], tmp_path: Path
-) -> None:
-    script, _ = counting
-    script.write_text("# %%\nimport os\n1 / 0\n")
-    with pytest.raises(PluginError, match=r"^tutorials/03_try\.py, line 3: ZeroDivisionError"):
-        hooks.lesson(script, tmp_path / "cache")
-    script.write_text("# %%\nimport os\nos._exit(7)\n")
-    with pytest.raises(PluginError, match=r"^03_try\.py: exit code 7$"):
-        hooks.lesson(script, tmp_path / "cache")
-    assert not (tmp_path / "cache").exists()
+def test_who_asks_while_another_makes_it_waits_and_gets_the_same(tmp_path: Path) -> None:
+    begun = threading.Barrier(2, timeout=60)
+    made: list[str] = []
+
+    def make() -> dict[str, bytes]:
+        made.append("|")
+        time.sleep(0.2)
+        return {"a": b"1"}
+
+    def ask() -> dict[str, bytes]:
+        begun.wait()
+        return kept.made(tmp_path, "a", lambda: "hash", make)
+
+    with ThreadPoolExecutor(2) as pool:
+        asked = [pool.submit(ask) for _ in range(2)]
+    assert [of.result() for of in asked] == [{"a": b"1"}] * 2
+    assert made == ["|"]
+
+
+def test_where_nothing_can_be_written_nothing_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert kept.made(tmp_path / "file" / "cache", "a", lambda: "h", lambda: {"a": b""}) == {
+        "a": b""
+    }
 
 
 def test_examples_become_code_and_errata_rows_links() -> None:

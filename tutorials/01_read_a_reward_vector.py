@@ -7,7 +7,9 @@
 # A **reward vector** does. It splits the Q-value over time, and its entries still add up to it.
 # This is Temporal Reward Decomposition, TRD for short. In this lesson you learn to read one.
 #
-# You need a little Python and no reinforcement learning. Allow a quarter of an hour.
+# - **Goal:** say from a vector when an agent expects which reward, and why it prefers an action.
+# - **Before it:** a little Python, and no reinforcement learning.
+# - **Time:** a quarter of an hour to read; some seconds to run, on two cores.
 
 # %% [markdown]
 # ## A drone at a fork
@@ -27,8 +29,7 @@ from trdlab.gridworld.render import draw_map
 from trdlab.show.plots.moment import plot_components
 from trdlab.show.plots.style import action_colours
 from trdlab.tabular import exact, undiscounted_totals
-
-from exercise import check
+from trdlab.teach import check
 
 world = Gridworld(load_map("drone"))
 print("\n".join(world.grid.rows))
@@ -100,6 +101,20 @@ down
 #
 # We asked for N = 4 explicit components, so the vector has N + 1 = 5 entries. The residual is
 # always there, and always last.
+
+# %% [markdown]
+# > **The formula.** The reward $R_{t+k}$ is paid $k$ steps from now. Component $i$ is the expected,
+# > discounted reward of its own $w$ steps, for $i < N$:
+# >
+# > $$c_i(s,a)=\mathbb{E}\Big[\sum_{k=iw}^{iw+w-1}\gamma^k R_{t+k}\;\Big|\;s,a\Big]$$
+# >
+# > The residual takes all the rest, and nothing is left out:
+# >
+# > $$c_N(s,a)=\mathbb{E}\Big[\sum_{k=Nw}^{\infty}\gamma^k R_{t+k}\;\Big|\;s,a\Big]$$
+# >
+# > $$\sum_{i=0}^{N}c_i(s,a)=Q(s,a)$$
+# >
+# > Here $N = 4$ and $w = 1$. What $w > 1$ is for, you see at the end of the lesson.
 
 # %% [markdown]
 # ## Nothing is lost
@@ -245,6 +260,11 @@ check("1.2", answer_2)
 # %%
 answer_3 = None  # replace with a number
 check("1.3", answer_3)
+
+# %% [markdown]
+# > **An open question.** The drone chose down because one sum was larger than another. It never
+# > looked at the components. So is the vector an explanation of the *choice*, or only a description
+# > of what the drone expects? What would you have to see to call it the reason?
 
 # %% [markdown]
 # ## What you can read now

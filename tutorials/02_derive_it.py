@@ -5,7 +5,9 @@
 # Q-value may be cut into slices, the one equation by which the slices follow from each other, and
 # three places where a reward vector must be read with care.
 #
-# You need lesson 1, and to have met an expectation E[…] before. Allow half an hour.
+# - **Goal:** derive the vector, and know where it must be read with care.
+# - **Before it:** lesson 1, and to have met an expectation E[…] before.
+# - **Time:** half an hour to read; some seconds to run, on two cores.
 
 # %%
 import numpy as np
@@ -15,8 +17,7 @@ from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.gridworld import Gridworld, load_map, map_names
 from trdlab.tabular import exact, undiscounted_totals
-
-from exercise import check
+from trdlab.teach import check
 
 GAMMA = 0.95
 world = Gridworld(load_map("drone"))
@@ -96,6 +97,13 @@ except InputError as error:
 #
 # That is all: **put r in front, fold the last two.** Where the episode ends, nothing follows, and
 # γ is replaced by 0.
+#
+# > **The formula.** In general $r$ is the discounted sum of $w$ rewards, and $n$ the vector of what
+# > the policy does $w$ steps later:
+# >
+# > $$c(s,a)=\mathbb{E}\big[\,r,\;\gamma^w n_0,\;\dots,\;\gamma^w(n_{N-1}+n_N)\,\big]$$
+# >
+# > After a termination $n = 0$.
 
 
 # %%
@@ -340,6 +348,11 @@ check("2.2", answer_2)
 # %%
 answer_3 = None  # replace with a number
 check("2.3", answer_3)
+
+# %% [markdown]
+# > **An open question.** Somebody is refused a loan by an agent, and the law wants a reason. In
+# > this state two actions were tied, with different futures. Which vector would you show? What
+# > would have to stand beside it?
 
 # %% [markdown]
 # ## What you have derived

@@ -1,11 +1,15 @@
 # %% [markdown]
-# # Lesson 4: why the loss on the sum fails, and what wide windows change
+# # Lesson 4: why the sum fails
 #
 # In [lesson 3](03_learn_it.md) a table learned each component from its own target. Two questions
 # were left. An agent needs only the sum to act: could it not learn the sum, and let the components
 # follow? And with w > 1, where a component covers many steps, what happens to learning?
 #
-# The answers are *no*, and *more than it seems*. Allow half an hour.
+# The answers are *no*, and *more than it seems*.
+#
+# - **Goal:** know which loss learns components, and whose future a wide window tells.
+# - **Before it:** [lesson 3](03_learn_it.md).
+# - **Time:** half an hour to read; about 20 seconds to run, on two cores.
 
 # %%
 from textwrap import fill
@@ -18,8 +22,7 @@ from trdlab.gridworld import Gridworld, load_map
 from trdlab.show.plots.moment import plot_components
 from trdlab.show.plots.style import action_colours
 from trdlab.tabular import WindowBuilder, exact, learn, operator_table
-
-from exercise import check
+from trdlab.teach import check
 
 GAMMA = 0.95
 UP, DOWN, LEFT, RIGHT = range(4)
@@ -76,7 +79,14 @@ for ax, (how, vector) in zip(axes, shown.items(), strict=True):
 #
 # We can say exactly where. The sum depends on each component in the same way, so the gradient of
 # the loss is *the same number* for all of them. They only ever move together. Whatever stood
-# between two components at the beginning stands there at the end:
+# between two components at the beginning stands there at the end.
+#
+# > **The formula.** The slope is the same for every $i$, and so is the way that each component
+# > goes:
+# >
+# > $$\frac{\partial}{\partial c_i}\Big(\sum_j c_j-y\Big)^2=2\Big(\sum_j c_j-y\Big)$$
+# >
+# > $$c_i^{\text{end}}=c_i^{\text{start}}+\frac{1}{N+1}\Big(Q-\sum_j c_j^{\text{start}}\Big)$$
 
 # %%
 start, end = initial[0, DOWN], down.components
@@ -298,6 +308,11 @@ check("4.2", answer_2)
 # %%
 answer_3 = None  # replace with a number from 0 to 1
 check("4.3", answer_3)
+
+# %% [markdown]
+# > **An open question.** You deploy an agent that always takes the best action. Its vectors were
+# > learned from an agent that was random now and then. Is that a wrong explanation of your agent,
+# > or a right one of another? How could somebody find out whom you have not told?
 
 # %% [markdown]
 # ## What you have learned

@@ -7,8 +7,9 @@
 # each in one line. The score will not tell you who. A **calibration** will, and it will tell you
 # what to look for in the code.
 #
-# You need [lesson 2](02_derive_it.md) and its law, and some of [lesson 3](03_learn_it.md). Allow
-# three quarters of an hour.
+# - **Goal:** find out which mistake an agent's forecasts hold, without an exact table.
+# - **Before it:** [lesson 2](02_derive_it.md) and its law, and some of [lesson 3](03_learn_it.md).
+# - **Time:** three quarters of an hour to read; half a minute to run, on two cores.
 
 # %%
 import textwrap
@@ -31,8 +32,7 @@ from trdlab.show.plots.calibration import plot_trust, trust_handles
 from trdlab.show.plots.style import add_legend
 from trdlab.tabular import exact
 from trdlab.tabular.episodes import ModelEnvironments
-
-from exercise import check
+from trdlab.teach import check
 
 # %% [markdown]
 # ## 1. One autopilot
@@ -189,6 +189,13 @@ for name, table in tables.items():
 # against what was paid in the steps after it. `assess` plays and judges. All it needs is something
 # that turns states into reward vectors, the policy that these speak of, and somewhere to fly. No
 # exact table is used.
+#
+# > **The formula.** The *skill* of component $i$ compares the forecasts $c_{t,i}$ with what then
+# > came, $x_{t,i}$. The guess that is always the same is the mean $\bar x_i$:
+# >
+# > $$\text{skill}_i=1-\frac{\sum_t(c_{t,i}-x_{t,i})^2}{\sum_t(\bar x_i-x_{t,i})^2}$$
+# >
+# > It is 1 for a perfect forecast, and 0 for one that is no better than the guess.
 
 
 # %%
@@ -403,6 +410,11 @@ check("6.2", answer_2)
 # %%
 answer_3 = None  # replace with the number of a line
 check("6.3", answer_3)
+
+# %% [markdown]
+# > **An open question.** One forecast says the mean of all games, always. It is never too high or
+# > too low on average, and it tells nothing. Another one tells much, and is always a little too
+# > high. Which would you give to a player, and which to a surgeon? Could one number judge both?
 
 # %% [markdown]
 # ## What you have learned

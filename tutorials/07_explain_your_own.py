@@ -5,14 +5,16 @@
 # trained it. In this lesson you find out, from `pip install` to a report. You do not train the
 # agent again. You let it play, learn what comes, and ask how far that can be trusted.
 #
-# [Lesson 1](01_read_a_reward_vector.md) is enough to follow. Allow ten minutes to read; the
-# computer needs one or two. In the folder of the source:
+# - **Goal:** fit an agent that you have, judge the fit, and ask it.
+# - **Before it:** [lesson 1](01_read_a_reward_vector.md), and the extra `interop`.
+# - **Time:** half an hour to read; one to two minutes to run, on two cores.
+#
+# The extra adds Stable-Baselines3, which trains the agent of this lesson. In the folder of the
+# source:
 #
 # ```console
 # $ pip install '.[interop]'
 # ```
-#
-# `interop` adds Stable-Baselines3, which trains the agent of this lesson.
 
 # %%
 import sys
@@ -22,8 +24,7 @@ import torch
 
 import trdlab
 from trdlab.policies import EpsilonGreedy, Likeliest
-
-from exercise import check
+from trdlab.teach import check
 
 try:
     from stable_baselines3 import PPO
@@ -221,6 +222,13 @@ print(f"Tested for {told} steps. The game was over after {len(episode) - worst}.
 # These are chances of *different* steps, and a game ends only once. So add them up, and you have
 # the chance that it has fallen by then. The fit has learned another number that says the same: the
 # chance that the game still runs when a step begins, its `survival`.
+#
+# > **The formula.** With $p_{t+j}$ the chance that the game ends at step $t+j$, the game still runs
+# > at step $t+i$ with the chance
+# >
+# > $$s_i=1-\sum_{j=0}^{i-1}p_{t+j}$$
+# >
+# > Where each step pays 1, a component is that chance, discounted: $c_i=\gamma^i s_i$.
 
 # %%
 for name, chance, runs in zip(
@@ -359,10 +367,10 @@ answer_4 = None  # replace with a whole number
 check("7.4", answer_4)
 
 # %% [markdown]
-# **To think about.** Train the agent of section 1 for ten times as long. Before you fit it, write
-# down what you expect of its score, of its skill, and of the sentences of its report. Then try.
-# What would you have to change to learn where its weak points are? And of which agent would that
-# report speak?
+# > **An open question.** Train the agent of section 1 for ten times as long. Before you fit it,
+# > write down what you expect of its score, of its skill, and of the sentences of its report. Then
+# > try. What would you have to change to learn where its weak points are? And of which agent would
+# > that report speak?
 
 # %% [markdown]
 # ## What you have learned

@@ -6,9 +6,11 @@
 # make, and easy to believe, also where they are wrong. In this lesson you learn to make them, to
 # test them, and when not to show them.
 #
-# We begin where the truth is known. [Lesson 1](01_read_a_reward_vector.md) is enough to follow;
-# [lesson 7](07_explain_your_own.md) helps. Allow fifteen minutes to read; the computer needs less
-# than one.
+# We begin where the truth is known.
+#
+# - **Goal:** make a map of what a forecast hangs on, test it, and know when not to show it.
+# - **Before it:** [lesson 1](01_read_a_reward_vector.md); [lesson 7](07_explain_your_own.md) helps.
+# - **Time:** half an hour to read; half a minute to run, on two cores.
 
 # %%
 import gymnasium as gym
@@ -16,8 +18,7 @@ import numpy as np
 import torch
 
 import trdlab
-
-from exercise import check
+from trdlab.teach import check
 
 torch.set_num_threads(1)  # such small networks are no faster with more
 
@@ -148,6 +149,13 @@ table(by_pushing[:, 1], by_pushing[:, 5])
 # There is a cure. Do not push only here. Walk from some *baseline* to here on a straight line, and
 # push at each step of the way. An entry's mean slope, times how far it went, is what it *adds*.
 # These are integrated gradients. Our baseline is the mean of what is met: each entry at 0.5.
+#
+# > **The formula.** On the way from the baseline $b$ to the observation $x$, entry $e$ adds to
+# > component $k$
+# >
+# > $$a_e=(x_e-b_e)\int_0^1\frac{\partial c_k}{\partial x_e}\big(b+\lambda(x-b)\big)\,d\lambda$$
+# >
+# > Together they add the whole difference: $\sum_e a_e=c_k(x)-c_k(b)$.
 
 # %%
 BASE = np.full(10, 0.5)
@@ -409,6 +417,11 @@ check("9.4", answer_4)
 # **To try next.** Let the scale of section 1 pay for the *lighter* one of the first two parcels.
 # Which entries matter for t+1 now? Find it by hiding, by pushing and by walking, before you train
 # anything. Then take `pretrained:Pong`, and ask what its maps hang on before a point is lost.
+
+# %% [markdown]
+# > **An open question.** A map passes both checks, and still shows the wall dimmer than it should
+# > be. A doctor sees such a map of a scan, and looks no further than where it is bright. Who is to
+# > blame? What would you have shown in its place?
 
 # %% [markdown]
 # ## What you have learned

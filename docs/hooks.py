@@ -31,6 +31,8 @@ from mkdocs.structure import files as structure
 from mkdocs.structure.pages import Page
 from notebooks import lessons
 
+from trdlab import playground
+
 DOCS = Path(__file__).parent
 _FROM_THE_NETWORK = re.compile(
     r'<(?:script|img|iframe)[^>]* src="https?:[^"]*|<link[^>]* href="https?:[^"]*'
@@ -52,7 +54,9 @@ def on_startup(**_: Any) -> None:
 
 
 def on_files(files: structure.Files, config: MkDocsConfig) -> structure.Files:
-    """Adds the lessons, and makes every page plain Markdown."""
+    """Adds the playground and the lessons, and makes every page plain Markdown."""
+    element = structure.File.generated(config, "assets/playground.js", content=playground.script())
+    files.append(element)
     add_lessons(files, config)
     pages = files.documentation_pages()
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # the first that fails ends it

@@ -18,7 +18,11 @@ from typing import Any
 import pytest
 
 pytest.importorskip("mkdocs")
+from mkdocs.config import load_config
 from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import Files
+
+from trdlab.playground import script
 
 ROOT = Path(__file__).parents[1]
 
@@ -38,6 +42,19 @@ with pytest.MonkeyPatch.context() as patch:
     hooks, catalogue, kept = _load("hooks"), _load("catalogue"), _load("kept")
     blocks_of = _load("executed")
     docstrings = _load("docstrings")
+
+
+def test_the_playground_of_the_site_is_that_of_the_package(tmp_path: Path) -> None:
+    for folder in ("docs", "tutorials"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "mkdocs.yml").write_text("site_name: trdlab\n", encoding="utf-8")
+    config = load_config(str(tmp_path / "mkdocs.yml"))
+    config.plugins._current_plugin = "docs/hooks.py"  # as while MkDocs calls a hook
+    files = hooks.on_files(Files([]), config)
+    made = files.get_file_from_path("assets/playground.js")
+    assert made is not None
+    assert made.content_string == script()
+    assert 'src="assets/playground.js"' in (ROOT / "docs" / "playground.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", None], ids=["empty", "no archive", "cut"])

@@ -11,6 +11,7 @@ from trdlab import __version__
 HELP = "When does an agent expect which reward, and how far can that be trusted?"
 COMMANDS = {
     "gridworld": "trdlab.cli.gridworld",
+    "playground": "trdlab.cli.playground",
     "tabular": "trdlab.cli.tabular",
     "explain": "trdlab.cli.explain",
     "video": "trdlab.cli.video",

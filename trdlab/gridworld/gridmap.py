@@ -143,6 +143,11 @@ def map_names() -> tuple[str, ...]:
     return ("drone", *(name for name in found if name != "drone"))
 
 
+def map_text(name: str) -> str:
+    """Returns a built-in map as it is written."""
+    return (_FOLDER / f"{name}.txt").read_text(encoding="utf-8")
+
+
 def load_map(name_or_file: str | Path) -> GridMap:
     r"""Returns a built-in map by its name, or reads one from a file: `name_or_file`.
 
@@ -156,7 +161,7 @@ def load_map(name_or_file: str | Path) -> GridMap:
     """
     text = str(name_or_file)
     if text in map_names():
-        return parse_map((_FOLDER / f"{text}.txt").read_text(encoding="utf-8"), name=text)
+        return parse_map(map_text(text), name=text)
     path = Path(text)
     try:
         with path.open(encoding="utf-8-sig") as file:

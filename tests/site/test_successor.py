@@ -40,6 +40,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("reference/explanations/calibration.html", "<dt>"),
         ("reference/cli.html", "--gamma"),
         ("maps.html", "<svg"),
+        ("playground.html", "assets/playground.js"),
     ],
 )
 def test_it_shows_what_ours_shows(built: Path, page: str, says: str) -> None:

@@ -114,7 +114,7 @@ def on_post_template(output_content: str, template_name: str, **_: Any) -> str:
     """Lets the page for missing pages find its files on disk, too, where there is no root."""
     if template_name != "404.html":
         return output_content
-    relative = re.sub(r'((?:href=|src=|"base": )")/', r"\1", output_content)
+    relative = re.sub(r'((?:href=|src=|"base": |"search": )")/', r"\1", output_content)
     return relative.replace("<head>", f"<head>{_ROOT_OF_A_SERVER}", 1)
 
 

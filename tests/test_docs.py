@@ -304,8 +304,10 @@ def test_a_page_may_link_to_the_network_and_load_its_own_files() -> None:
 
 def test_the_page_for_missing_pages_finds_its_files_on_disk_too() -> None:
     html = '<head></head><link href="/assets/a.css"><script src="/assets/a.js"></script>'
+    html += '<script>{"search": "/assets/search.js"}</script>'
     shown = hooks.on_post_template(html, template_name="404.html")
     assert '<link href="assets/a.css"><script src="assets/a.js">' in shown
+    assert '{"search": "assets/search.js"}' in shown
     assert "if (location.protocol !== 'file:')" in shown  # a server has a root
     assert hooks.on_post_template(html, template_name="sitemap.xml") == html
 

@@ -25,21 +25,24 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "mkdocs.yml").write_text(f"{settings}\ndocs_dir: pages\n", encoding="utf-8")
     for name in ("docs", "trdlab"):  # which the settings name
         (folder / name).symlink_to(ROOT / name)
-    command = [sys.executable, "-m", "zensical", "build", "--strict"]
+    command = [sys.executable, "-m", "zensical", "build"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{done.stdout}{done.stderr}"
+    said = re.sub("\x1b\\[[0-9;]*m", "", f"{done.stdout}{done.stderr}")
+    assert done.returncode == 0, said
+    found = set(re.findall("^Warning: (.*)$", said, re.MULTILINE))
+    assert found <= {"anchor does not exist"}, said  # the playground's links hold its state
     return folder / "site"
 
 
 @pytest.mark.parametrize(
     ("page", "says"),
     [
-        ("index.html", "down</strong>"),
+        ("index.html", "When does an agent expect which reward"),
         ("lessons/01_read_a_reward_vector.html", 'class="output'),
-        ("reference/tabular.html", 'id="trdlab.tabular.table.exact"'),
+        ("reference/tabular.html", 'id="trdlab.tabular.MDP"'),
         ("reference/explanations/calibration.html", "<dt>"),
         ("reference/cli.html", "--gamma"),
-        ("maps.html", "<svg"),
+        ("index.html", 'class="picture"'),
         ("playground.html", "assets/playground.js"),
     ],
 )

@@ -396,3 +396,29 @@ def test_a_command_that_fails_on_a_page_fails_the_build(
     assert (done.returncode == 0) == ok, done.stderr
     assert ok or "trdlab nonsense" in done.stderr
     assert len(list((tmp_path / ".cache").rglob("*.zip"))) == ok
+
+
+@pytest.mark.parametrize(("code", "ok"), [("print('hello')", True), ("1 / 0", False)])
+def test_a_lesson_becomes_a_page_with_its_downloads(tmp_path: Path, code: str, ok: bool) -> None:
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "index.md").write_text("# T\n")
+    (tmp_path / "tutorials" / "notebooks").mkdir(parents=True)
+    (tmp_path / "tutorials" / "notebooks" / "01_try.ipynb").write_text("{}")
+    script = tmp_path / "tutorials" / "01_try.py"
+    script.write_text(f"# %% [markdown]\n# # Try\n\n# %%\n{code}\n")
+    (tmp_path / "mkdocs.yml").write_text(
+        f"site_name: T\nhooks: ['{ROOT / 'docs' / 'hooks.py'}']\nuse_directory_urls: false\n"
+        "markdown_extensions: [attr_list, pymdownx.superfences]\nplugins: []\n"
+        "theme: {name: mkdocs, highlightjs: false}\n"
+    )
+    site = tmp_path / "site"
+    done = build(tmp_path / "mkdocs.yml", site)
+    assert (done.returncode == 0) == ok, done.stderr
+    if not ok:
+        assert "tutorials/01_try.py, line 5: ZeroDivisionError: division by zero" in done.stderr
+        return
+    page = (site / "lessons" / "01_try.html").read_text(encoding="utf-8")
+    assert "hello" in page
+    for name in re.findall(r'href="(01_try\.\w+)"', page):
+        assert (site / "lessons" / name).exists()
+    assert page.count(" download") == 2

@@ -71,11 +71,12 @@ print(f"The student: {score.value:.0f} ({score.low:.0f} to {score.high:.0f})")
 # It reaches the top, after a few seconds of training. Alone it would have found nothing in that
 # time.
 #
-# > **The formula.** The student's chances $q$ of each action are drawn to the teacher's, $p$:
+# > **The formula.** This loss is least where the student's chances $q$ of all actions are those of
+# > the teacher, $p$:
 # >
 # > $$L=\sum_a p(a)\,\ln\frac{p(a)}{q(a)}$$
 # >
-# > It is 0 where both are the same. This is the Kullback–Leibler divergence.
+# > It is 0 there, and above 0 elsewhere. It is called the Kullback–Leibler divergence.
 #
 # ## 3. Who is explained?
 #

@@ -1,6 +1,5 @@
 """The machinery of the documentation: what is kept, lists of the reference, docstrings."""
 
-import importlib.util
 import re
 import subprocess
 import sys
@@ -9,7 +8,7 @@ import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,26 +17,16 @@ from mkdocs.config import load_config
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import Files
 
+from loading import loaded
 from trdlab.playground import script
 
 ROOT = Path(__file__).parents[1]
 
 
-def _load(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"docs_{name}", ROOT / "docs" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-with pytest.MonkeyPatch.context() as patch:
-    patch.syspath_prepend(ROOT / "docs")  # as MkDocs does for a hook
-    hooks, catalogue, kept = _load("hooks"), _load("catalogue"), _load("kept")
-    blocks_of = _load("executed")
-    docstrings = _load("docstrings")
+hooks, catalogue, kept, blocks_of, docstrings = (
+    loaded(ROOT / "docs" / f"{name}.py")
+    for name in ("hooks", "catalogue", "kept", "executed", "docstrings")
+)
 
 
 def test_the_playground_of_the_site_is_that_of_the_package(tmp_path: Path) -> None:

@@ -1,15 +1,12 @@
 """The pages that explain and teach: what they point to is there, and adds up."""
 
 import ast
-import importlib.util
 import io
 import json
 import re
 import shlex
-import sys
 import zipfile
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -20,6 +17,7 @@ from mkdocs.exceptions import PluginError
 
 import trdlab
 from browser import Visit, chromium
+from loading import loaded
 from trdlab.teach.checking import EXERCISES
 
 ROOT = Path(__file__).parents[1]
@@ -28,19 +26,7 @@ WHY = [DOCS / "why" / f"{name}.md" for name in ("theorem", "saliency", "calibrat
 TEACH = sorted((DOCS / "teach").glob("*.md"))
 
 
-def _load() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("docs_teaching", DOCS / "teaching.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-with pytest.MonkeyPatch.context() as patch:
-    patch.syspath_prepend(DOCS)  # as MkDocs does for a hook
-    teaching = _load()
+teaching = loaded(DOCS / "teaching.py")
 
 
 def text(page: Path) -> str:

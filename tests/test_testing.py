@@ -1,12 +1,9 @@
 """The conformance kit: each breach is named, each golden is right by other means."""
 
-import importlib.util
 import json
-import sys
 import warnings
 from dataclasses import FrozenInstanceError
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import gymnasium as gym
@@ -18,6 +15,7 @@ from hypothesis import strategies as st
 
 import trdlab.envs
 import trdlab.testing
+from loading import loaded
 from trdlab.decomposition import RewardDecomposition, TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
@@ -38,17 +36,7 @@ AXIS = TimeAxis(0.95, horizon=2, width=2)
 SCHEMA = Path(trdlab.testing.__file__).parent / "golden.schema.json"
 
 
-def _load_script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("goldens", Path(__file__).parent / "goldens.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-script = _load_script()
+script = loaded(Path(__file__).parent / "goldens.py")
 
 
 # ---- estimators that do as they should ---------------------------------------------------------

@@ -109,7 +109,7 @@ def test_every_argument_of_an_exported_name_is_told(names: list[Public]) -> None
         f"{found.where}: {argument.arg}"
         for found in names
         if isinstance(found.node, ast.FunctionDef) and found.docstring
-        if found.where in open_to_all or found.where.rpartition(".")[0] in open_to_all
+        if (found.where.rpartition(".")[0] if found.inside else found.where) in open_to_all
         for arguments in [found.node.args]
         for argument in [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
         if argument.arg not in {"self", "cls", *known}

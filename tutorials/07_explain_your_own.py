@@ -145,10 +145,10 @@ game.plot()
 # with the steps that the agent does not expect to reach. You also see false alarms, where the
 # picture turned pale and then dark again. That is what a chance looks like.
 #
-# The numbered moments, if there are any, hold what was expected of an action against what was
-# expected one step later. They leave out which action was drawn. But in CartPole there is no other
-# chance: a push always does the same. So did the agent *draw* the fall? Hold what was expected
-# before each draw against what is expected of the action that was drawn:
+# The numbered moments, if there are any, are draws: the agent drew an action that is worse than
+# what it draws on average. Nothing else is left to chance in CartPole, where a push always does the
+# same. So which draw was it? Hold what was expected before each draw against what is expected of
+# the action that was drawn:
 
 # %%
 (episode,) = fitted.play(1, seed=SEED)

@@ -944,7 +944,7 @@ Table(
         )
         + " of the way from random play to the teacher.",
         "Other games and teachers; one seed each; imitation by a policy head "
-        "([how](../train.md#from-a-teacher)).",
+        "([how](../how-to/teacher.md)).",
     ),
     Row(
         "fig:dqn-sweep-episodic-return",

@@ -10,7 +10,7 @@ demo: $(VENV)/installed
 	$(BIN)/trdlab gridworld --gamma 0.95 --N 2 --w 2
 	$(BIN)/trdlab explain pretrained:Breakout --step 200 --what forecast --episodes 0
 
-test: lint types imports unit docs site-check
+test: lint types imports docs site-check unit  # docs first: it runs the lessons side by side
 
 lint: $(VENV)/installed-tests
 	$(BIN)/ruff check .

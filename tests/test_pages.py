@@ -51,6 +51,7 @@ ONLY_PARSED = {
     r"acktr|young|runs/received|@\d+|LunarLander": "a file that everybody has another one of",
     r"\.\.\.|[A-Z]{3,}|\bDIR\b|FILE": "stands for another word",
     r"study score": "tests/study has it",
+    r"trdlab playground": "serves until it is stopped; tests/playground has it",
     r"--weights": "of a checkpoint that takes minutes to reach",
     r"--preset gpu|--device cuda$": "needs a card",
 }

@@ -82,7 +82,7 @@ def test_every_other_command_names_what_there_is() -> None:
             words = shlex.split(command)
             if words[0] == "make":
                 assert words[1] in targets, command
-            for path in re.findall(r"((?<= -[rc] )\w+\.txt|\w+/\w+\.py)", command):
+            for path in re.findall(r"((?<= -[rc] )\w+\.txt|(?:\w+/)+\w+\.py)", command):
                 assert (ROOT / path).exists(), command
             for extras in re.findall(r"(?:trdlab|\.)\[([\w,]+)\]", command):
                 assert set(extras.split(",")) <= set(project["optional-dependencies"]), command

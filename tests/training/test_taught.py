@@ -404,7 +404,9 @@ def test_a_game_is_played_as_the_teacher_knows_it(tmp_path):
 def test_with_a_teacher_the_presets_do_not_begin_at_random(tmp_path):
     taught = read_settings("atari", "Breakout", "paper", None, {"teacher": "a.pt"})
     assert (taught.epsilon_start, taught.learning_starts) == (0.01, 10_000)
-    assert (taught.teacher_steps, taught.offline_updates) == (100_000, 30_000)
+    assert (taught.teacher_steps, taught.offline_updates) == (1_000_000, 1_000_000)
+    on_a_card = read_settings("atari", "Breakout", "gpu", None, {"teacher": "a.pt"})
+    assert (on_a_card.teacher_steps, on_a_card.offline_updates) == (100_000, 30_000)
     small = read_settings(
         "gym", "CartPole-v1", "smoke", None, {"teacher": "a", "teacher_steps": 99}
     )

@@ -223,7 +223,8 @@ def test_every_critic_says_what_its_library_says(model, live, tmp_path):
         likely = ask(policy, shown, None, begins)[0]
         told, their = their_values(made, together(batch), their, begins, likely)
         values, mine = policy.state_values(shown, mine, begins, likely)
-        np.testing.assert_allclose(values, told, rtol=2e-5, atol=2e-5 * np.abs(told).max())
+        # sums of pixels up to 255 are rounded in another order on every kind of processor
+        np.testing.assert_allclose(values, told, rtol=2e-5, atol=1e-4 * np.abs(told).max())
         said.append(values)
     assert np.ptp(said) > 1e-3
     greedy = Likeliest(policy)

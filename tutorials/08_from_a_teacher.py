@@ -146,7 +146,7 @@ moment.plot()
 #
 # ```console
 # $ trdlab train atari Breakout --preset smoke        # a minute, to see that it works
-# $ trdlab train atari Breakout                       # twenty minutes, from the one above
+# $ trdlab train atari Breakout                       # half an hour, from the one above
 # $ trdlab train atari Breakout --teacher mine.zip    # from one of yours
 # ```
 #

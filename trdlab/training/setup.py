@@ -122,7 +122,7 @@ def course_line(settings: TrainSettings, preset_name: str | None, given: Mapping
 
     >>> told = {"teacher": "a.pt"}
     >>> course_line(preset("atari", "Pong").changed(told), "cpu", told)
-    'With a teacher it takes about twenty minutes on two cores.'
+    'With a teacher it takes about half an hour on two cores.'
     >>> course_line(preset("atari", "Pong", "paper"), "paper", {})
     ''
     """
@@ -130,7 +130,7 @@ def course_line(settings: TrainSettings, preset_name: str | None, given: Mapping
     if not is_cpu or given.keys() - {"teacher", "seed"}:
         return ""
     if settings.teacher is not None:
-        return "With a teacher it takes about twenty minutes on two cores."
+        return "With a teacher it takes about half an hour on two cores."
     return (
         "From scratch a CPU takes hours for a million steps, and in these few games get far: "
         "--teacher takes less."

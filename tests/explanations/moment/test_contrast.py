@@ -12,8 +12,9 @@ from trdlab.decomposition import TimeAxis
 from trdlab.errors import InputError
 from trdlab.estimator import Future
 from trdlab.explanations.moment.exact import gridworld_moment
-from trdlab.explanations.moment.moment import Choice, moment_of
+from trdlab.explanations.moment.moment import CHOICES, Choice, moment_of
 from trdlab.explanations.moment.telling import in_brief
+from trdlab.explanations.rules import UnsupportedSentenceError, check
 from trdlab.gridworld import Gridworld, load_map, parse_map
 from trdlab.tabular import exact, learn
 
@@ -323,6 +324,10 @@ def test_differences_far_below_what_forecasts_are_off_by_are_not_discussed():
         "off by about 0.707."
     )
     assert [claim.kind for claim in in_brief(of)][:2] == ["hardly-apart", "better"]
+    assert check(close.sentence, [(CHOICES, of)])[0].kind == "hardly-apart"
+    for right, wrong in (("0.025", "0.035"), ("0.707", "0.607"), ("hardly", "clearly")):
+        with pytest.raises(UnsupportedSentenceError):
+            check(close.sentence.replace(right, wrong), [(CHOICES, of)])
     assert not of_kind(of, "more-immediate")
     assert not of_kind(of, "reasons")
     known = calibrated(TimeAxis(GAMMA, 3), off_by=[0.0, 0.1, 0.1, 0.0])  # 0.02 > 0.1 √2 / 10
